@@ -1,0 +1,55 @@
+"""What every reaching controller offers: a view in, a Cartesian velocity out, and in the end a grasp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from mpgrasp.geometry import FloatArray
+from mpgrasp.grasp import Grasp, GraspMap
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observation:
+    """What the controller is told on a control tick."""
+
+    time: float
+    """Simulated time since the episode began [s]."""
+    T_world_tcp: FloatArray
+    """(4, 4) measured pose of the tool point."""
+    grasp_map: GraspMap
+    """The detector's view of this tick, with its camera pose."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Command:
+    """What the robot shall do until the next tick."""
+
+    twist: FloatArray
+    """(6,) velocity of the tcp in world axes: linear [m/s], then angular [rad/s]."""
+    gripper: float
+    """Opening of the gripper [m]."""
+    done: bool = False
+    """The reach is over: take `Controller.final_grasp`."""
+
+
+class Controller(Protocol):
+    """Steers the wrist camera while the hand comes down from z_max to z_min."""
+
+    name: str
+
+    def reset(self, seed: int) -> None:
+        """Forget the last episode; `seed` feeds whatever is random in the controller."""
+        ...
+
+    def update(self, observation: Observation) -> Command:
+        """Fuse one view and say how to move."""
+        ...
+
+    def final_grasp(self) -> Grasp | None:
+        """The grasp to execute, or None where no grasp was seen."""
+        ...
+
+    def diagnostics(self) -> dict[str, FloatArray | float | bool]:
+        """What the controller looked at on the last tick, for recordings: grids (ny, nx) and scalars."""
+        ...

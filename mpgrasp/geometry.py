@@ -1,0 +1,98 @@
+"""Rigid transforms, look-at poses and angles modulo pi, in plain numpy.
+
+A transform `T_a_b` is (4, 4) and maps points of frame b to frame a: `p_a = T_a_b p_b`.
+Quaternions are wxyz. Angles are radians.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.floating]
+
+
+def transform(rotation: ArrayLike, position: ArrayLike) -> FloatArray:
+    """Transform (4, 4) from a rotation (3, 3) and a position (3,) [m]."""
+    T = np.eye(4)
+    T[:3, :3] = rotation
+    T[:3, 3] = position
+    return T
+
+
+def invert(T: FloatArray) -> FloatArray:
+    """Inverse (4, 4) of a rigid transform, exact because the rotation is orthonormal."""
+    R = T[:3, :3]
+    return transform(R.T, -R.T @ T[:3, 3])
+
+
+def transform_points(T: FloatArray, points: FloatArray) -> FloatArray:
+    """Map points (..., 3) [m] by T (4, 4)."""
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def rotation_x(angle: float) -> FloatArray:
+    """Rotation (3, 3) about x."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def rotation_z(angle: float) -> FloatArray:
+    """Rotation (3, 3) about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def looking_down(position: ArrayLike, yaw: float = 0.0) -> FloatArray:
+    """Pose (4, 4) whose z axis points straight down and whose x axis has heading `yaw` in the world.
+
+    It serves both the tool (approach along +z) and an OpenCV camera (optical axis +z). At yaw 0 the
+    axes are x = world x, y = -world y, z = -world z.
+    """
+    return transform(rotation_z(yaw) @ np.diag([1.0, -1.0, -1.0]), position)
+
+
+def look_at(eye: ArrayLike, target: ArrayLike, x_axis: ArrayLike = (1.0, 0.0, 0.0)) -> FloatArray:
+    """Pose (4, 4) of an OpenCV camera (x right, y down, z forward) at `eye` that looks at `target`.
+
+    `x_axis` is the world direction that the image's right side should follow as far as possible; it
+    must not be parallel to the line of sight.
+    """
+    eye = np.asarray(eye, float)
+    z = np.asarray(target, float) - eye
+    z /= np.linalg.norm(z)
+    x = np.asarray(x_axis, float)
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    return transform(np.column_stack([x, np.cross(z, x), z]), eye)
+
+
+def wrap_half_pi(angle: ArrayLike) -> FloatArray:
+    """Fold angles of lines (a grasp is the same after half a turn) into [-pi/2, pi/2)."""
+    folded = np.mod(np.asarray(angle, float) + np.pi / 2, np.pi) - np.pi / 2
+    # np.mod may round up to pi itself for tiny negative inputs
+    return np.where(folded >= np.pi / 2, -np.pi / 2, folded)
+
+
+def wrap_pi(angle: ArrayLike) -> FloatArray:
+    """Fold angles into [-pi, pi)."""
+    folded = np.mod(np.asarray(angle, float) + np.pi, 2 * np.pi) - np.pi
+    return np.where(folded >= np.pi, -np.pi, folded)
+
+
+def line_angle_difference(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Smallest angle [0, pi/2] between lines of angle a and b."""
+    return np.abs(wrap_half_pi(np.asarray(a, float) - np.asarray(b, float)))
+
+
+def rotation_vector(R: FloatArray) -> FloatArray:
+    """Axis times angle (3,) [rad] of a rotation (3, 3); the logarithm map of SO(3)."""
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = np.linalg.norm(axis) / 2, (np.trace(R) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    if angle < 1e-9:
+        return axis / 2
+    if sine < 1e-6:  # half a turn: the axis is the eigenvector of eigenvalue 1
+        values, vectors = np.linalg.eigh((R + R.T) / 2)
+        return vectors[:, np.argmax(values)] * angle
+    return axis / (2 * sine) * angle

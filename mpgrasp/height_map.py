@@ -1,0 +1,39 @@
+"""The true shape of a scene seen from above, on a regular grid: what the oracle and the labels read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpgrasp.geometry import FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeightMap:
+    """Surface height above the table plane z = 0 on a grid of square cells.
+
+    `height[row, col]` is at world x = x0 + col * cell, y = y0 + row * cell (cell centres).
+    """
+
+    height: FloatArray
+    """(ny, nx) [m], highest surface in each cell's centre line."""
+    support: FloatArray
+    """(ny, nx) [m], height of the bare table and cloth below the objects."""
+    label: np.ndarray
+    """(ny, nx) int: 0 = support, k > 0 = object k - 1 of the scene."""
+    x0: float
+    """World x of column 0 [m]."""
+    y0: float
+    """World y of row 0 [m]."""
+    cell: float
+    """Edge of a cell [m]."""
+
+    def cells(self, x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(row, col, inside) of world positions; rows and columns are clipped, `inside` tells where."""
+        finite = np.isfinite(x) & np.isfinite(y)
+        col = np.rint((np.where(finite, x, 0) - self.x0) / self.cell).astype(int)
+        row = np.rint((np.where(finite, y, 0) - self.y0) / self.cell).astype(int)
+        ny, nx = self.height.shape
+        inside = finite & (row >= 0) & (row < ny) & (col >= 0) & (col < nx)
+        return np.clip(row, 0, ny - 1), np.clip(col, 0, nx - 1), inside
