@@ -5,17 +5,27 @@ the optical axis [m]; NaN means no return. Camera axes are OpenCV's: x right, y 
 
 Cropping and resizing return a new frame with the intrinsics of the new image, so that a pixel of a
 cropped and resized image maps to the world (the paper's eq. 3) by the same formula as any other.
+Holes are filled as in the published GG-CNN code (https://github.com/dougsm/ggcnn).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import functools
+from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, invert, transform_points
+
+CROP = 350
+"""Side of the central square of a 640 x 480 image that detectors see [px], as in published MVP code."""
+NETWORK_SIZE = 224
+"""Side of the detectors' input [px]."""
+EDGE_GAP = 0.010
+"""Depths farther apart than this are two surfaces, and are never averaged into one [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +55,15 @@ class CameraIntrinsics:
             fx=self.fx, fy=self.fy, cx=self.cx - col, cy=self.cy - row, width=width, height=height
         )
 
+    def centre_crop(self, size: int) -> CameraIntrinsics:
+        """Intrinsics of the central square of `size` px; where it cannot be central it lies up and left.
+
+        Raises:
+            ConfigError: the image is smaller than that.
+        """
+        row, col = _centre_window(self.height, self.width, size)
+        return self.crop(row, col, size, size)
+
     def resize(self, height: int, width: int) -> CameraIntrinsics:
         """Intrinsics after a resize to (height, width) that aligns the image's outer edges."""
         sx, sy = width / self.width, height / self.height
@@ -66,6 +85,12 @@ class CameraIntrinsics:
         """Pixels (..., 2) as (u, v) of camera-frame points (..., 3) [m] in front of the camera."""
         x, y, z = np.moveaxis(points, -1, 0)
         return np.stack([x / z * self.fx + self.cx, y / z * self.fy + self.cy], axis=-1)
+
+
+def _centre_window(height: int, width: int, size: int) -> tuple[int, int]:
+    if not 1 <= size <= min(height, width):
+        raise ConfigError("unusable crop size [px]", got=size, allowed=f"1 to {min(height, width)}")
+    return (height - size) // 2, (width - size) // 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,3 +125,71 @@ class DepthFrame:
     def pixels(self, points: FloatArray) -> FloatArray:
         """Pixels (..., 2) as (u, v) of world points (..., 3) [m]."""
         return self.intrinsics.project(transform_points(invert(self.T_world_camera), points))
+
+
+def crop_resize(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -> DepthFrame:
+    """The central square of `crop` px, resized to `size` px.
+
+    Each new pixel takes the surface of the old pixel at its centre, averaged by area over the part of its
+    footprint that lies within `EDGE_GAP` of it: noise is averaged, while no depth is invented between an object
+    and its background and no hole spreads. Where the centre is a hole, so is the new pixel.
+
+    Raises:
+        ConfigError: the image is smaller than `crop`, or `size` < 1.
+    """
+    if size < 1:
+        raise ConfigError("unusable image size [px]", got=size, allowed="1 or more")
+    row, col = _centre_window(*frame.depth.shape, crop)
+    window = np.s_[row : row + crop, col : col + crop]
+    rgb = None
+    if frame.rgb is not None:
+        rgb = np.asarray(cv2.resize(frame.rgb[window], (size, size), interpolation=cv2.INTER_AREA))
+    return replace(
+        frame,
+        depth=_resize_by_area(frame.depth[window], size),
+        intrinsics=frame.intrinsics.centre_crop(crop).resize(size, size),
+        rgb=rgb,
+    )
+
+
+def _resize_by_area(depth: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Square depth image resized to `size` px; see `crop_resize`."""
+    if depth.shape[0] == size:
+        return depth.copy()
+    index, weight, centre = _footprint(depth.shape[0], size)
+    reference = depth[np.ix_(centre, centre)]
+    total, mass = np.zeros_like(reference), np.zeros_like(reference)
+    for k in range(len(index)):
+        rows = depth[index[k]]
+        for m in range(len(index)):
+            offset = rows[:, index[m]] - reference
+            w = np.outer(weight[k], weight[m])
+            w *= np.abs(offset) < EDGE_GAP  # False where either is NaN
+            np.copyto(offset, 0, where=w == 0)
+            total += w * offset
+            mass += w
+    return reference + total / np.where(mass > 0, mass, 1)
+
+
+@functools.lru_cache(maxsize=8)
+def _footprint(old: int, new: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Old pixels under each new one along an axis: index (k, new), overlap (k, new) and the central one (new,)."""
+    start = np.arange(new) * old / new
+    end = start + old / new
+    index = np.floor(start).astype(int) + np.arange(int(np.ceil(old / new)) + 1)[:, None]
+    weight = np.clip(np.minimum(index + 1, end) - np.maximum(index, start), 0, None).astype(np.float32)
+    used = weight.max(axis=1) > 1e-6
+    centre = np.floor((start + end) / 2).astype(int)
+    return np.minimum(index, old - 1)[used], weight[used], centre
+
+
+def inpaint(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Copy of a depth image (H, W) [m] with its holes filled from their rims; all NaN stays all NaN."""
+    holes = np.isnan(depth)
+    if not holes.any() or holes.all():
+        return depth.copy()
+    # cv2 leaves the outermost pixels alone, hence the border of one pixel
+    padded = cv2.copyMakeBorder(np.where(holes, 0, depth), 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    mask = cv2.copyMakeBorder(holes.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    filled = cv2.inpaint(padded.astype(np.float32), mask, 1, cv2.INPAINT_NS)
+    return np.asarray(filled, np.float32)[1:-1, 1:-1].copy()

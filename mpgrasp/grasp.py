@@ -1,12 +1,12 @@
-"""Grasps in the image (eq. 2, 4) and in the world (eq. 1), and the way from one to the other (eq. 3).
+r"""Grasps in the image (eq. 2, 4) and in the world (eq. 1), and the way from one to the other (eq. 3).
 
 The grasp frame, the same as the tool frame `tcp` of the Panda hand, seen from above:
 
              world y
       x         |      y (closing)
-        \\       |     /
-          \\     |   /
-            \\   | /  angle
+        \       |     /
+          \     |   /
+            \   | /  angle
               `-o---------- world x
 
     z (approach) points into the table, y is the direction in which the fingers close, x = y cross z.
@@ -21,12 +21,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, looking_down, transform_points, wrap_half_pi
+from mpgrasp.geometry import FloatArray, invert, looking_down, transform_points, wrap_half_pi
+
+JAW = 0.02
+"""Width of the Panda's finger pads across the closing direction [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,8 +82,8 @@ class GraspMap:
 
     def world_points(self) -> FloatArray:
         """World points (H, W, 3) [m] of all pixels (eq. 3)."""
-        v, u = np.indices(self.depth.shape, sparse=True)
-        camera = self.intrinsics.deproject(*np.broadcast_arrays(u, v), self.depth.astype(float))
+        v, u = np.mgrid[: self.intrinsics.height, : self.intrinsics.width]
+        camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
         return transform_points(self.T_world_camera, camera)
 
     def world_angle(self) -> FloatArray:
@@ -90,19 +94,50 @@ class GraspMap:
         """Openings (H, W) [m] at each pixel's depth (eq. 3)."""
         return self.width * self.depth / self.intrinsics.fx
 
+    def grasp_of(self, rectangle: GraspRectangle) -> Grasp:
+        """The grasp in the world that a rectangle of this image stands for, at the nearest pixel's depth."""
+        rows, cols = self.depth.shape
+        row = int(np.clip(np.rint(rectangle.v), 0, rows - 1))
+        col = int(np.clip(np.rint(rectangle.u), 0, cols - 1))
+        return self._grasp(rectangle, row, col)
+
+    def rectangle_of(self, grasp: Grasp, jaw: float = JAW) -> GraspRectangle:
+        """The rectangle that a grasp in the world, with fingers `jaw` wide [m], covers in this image."""
+        camera = transform_points(invert(self.T_world_camera), np.asarray(grasp.position, float))
+        u, v = self.intrinsics.project(camera)
+        px_per_metre = self.intrinsics.fx / float(camera[2])
+        return GraspRectangle(
+            u=float(u),
+            v=float(v),
+            angle=float(world_to_image_angle(grasp.angle, self.T_world_camera)),
+            width_px=grasp.width * px_per_metre,
+            jaw_px=jaw * px_per_metre,
+        )
+
     def grasp_at(self, row: int, col: int) -> Grasp:
         """The grasp of one pixel in the world (eq. 3)."""
+        rectangle = GraspRectangle(
+            u=float(col),
+            v=float(row),
+            angle=float(self.angle[row, col]),
+            width_px=float(self.width[row, col]),
+            jaw_px=0.0,
+        )
+        return self._grasp(rectangle, row, col)
+
+    def _grasp(self, rectangle: GraspRectangle, row: int, col: int) -> Grasp:
         z = float(self.depth[row, col])
-        camera = self.intrinsics.deproject(np.float64(col), np.float64(row), np.float64(z))
+        k = self.intrinsics
+        camera = k.deproject(np.array(rectangle.u), np.array(rectangle.v), np.array(z))
         return Grasp(
             position=transform_points(self.T_world_camera, camera),
-            angle=float(wrap_half_pi(image_to_world_angle(self.angle[row, col], self.T_world_camera))),
-            width=float(self.width[row, col]) * z / self.intrinsics.fx,
+            angle=float(wrap_half_pi(image_to_world_angle(rectangle.angle, self.T_world_camera))),
+            width=rectangle.width_px * z / k.fx,
             quality=float(self.quality[row, col]),
         )
 
 
-def image_to_world_angle(angle: FloatArray, T_world_camera: FloatArray) -> FloatArray:
+def image_to_world_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
     """Heading in the world's xy plane [rad] of image directions at `angle` [rad], any shape."""
     # (du, dv) = (cos, -sin) is the camera-frame direction (cos, -sin, 0)
     c, s = np.cos(angle), np.sin(angle)
@@ -110,9 +145,100 @@ def image_to_world_angle(angle: FloatArray, T_world_camera: FloatArray) -> Float
     return np.arctan2(c * R[1, 0] - s * R[1, 1], c * R[0, 0] - s * R[0, 1])
 
 
-def world_to_image_angle(angle: FloatArray, T_world_camera: FloatArray) -> FloatArray:
+def world_to_image_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
     """Inverse of `image_to_world_angle` for a camera that looks down, folded to [-pi/2, pi/2)."""
     c, s = np.cos(angle), np.sin(angle)
     R = T_world_camera[:3, :3]  # rows of R.T are the camera axes in the world
     du, dv = c * R[0, 0] + s * R[1, 0], c * R[0, 1] + s * R[1, 1]
     return wrap_half_pi(np.arctan2(-dv, du))
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspRectangle:
+    """A grasp in the image, eq. 2, drawn as the rectangle between the fingers."""
+
+    u: float
+    """Centre, column [px]."""
+    v: float
+    """Centre, row [px]."""
+    angle: float
+    """Closing direction in the image [rad], counter-clockwise on screen."""
+    width_px: float
+    """Opening, along the closing direction [px]."""
+    jaw_px: float
+    """Width of the fingers, across the closing direction [px]."""
+
+    @classmethod
+    def from_corners(cls, corners: FloatArray) -> GraspRectangle:
+        """From corners (4, 2) as (u, v) whose first edge runs along the closing direction [px]."""
+        corners = np.asarray(corners, float)
+        if corners.shape != (4, 2) or not np.isfinite(corners).all():
+            raise ConfigError(
+                "unusable grasp rectangle", got=corners.tolist(), allowed="4 finite corners (u, v)"
+            )
+        edge, side = corners[1] - corners[0], corners[2] - corners[1]
+        u, v = corners.mean(axis=0)
+        return cls(
+            u=float(u),
+            v=float(v),
+            angle=float(wrap_half_pi(np.arctan2(-edge[1], edge[0]))),
+            width_px=float(np.hypot(*edge)),
+            jaw_px=float(np.hypot(*side)),
+        )
+
+    def corners(self) -> FloatArray:
+        """Corners (4, 2) as (u, v) [px]; the first edge runs along the closing direction."""
+        along = np.array([np.cos(self.angle), -np.sin(self.angle)]) * self.width_px / 2
+        across = np.array([np.sin(self.angle), np.cos(self.angle)]) * self.jaw_px / 2
+        corners = np.array([-along - across, along - across, along + across, -along + across])
+        return corners + np.array([self.u, self.v])
+
+    def iou(self, other: GraspRectangle) -> float:
+        """Area shared with `other` over the area of both together, in [0, 1]."""
+        mine, theirs = self.width_px * self.jaw_px, other.width_px * other.jaw_px
+        if min(mine, theirs) <= 0:
+            return 0.0
+        # single precision: keep the numbers small by measuring from this centre
+        origin = np.array([self.u, self.v])
+        shared, _ = cv2.intersectConvexConvex(
+            (self.corners() - origin).astype(np.float32), (other.corners() - origin).astype(np.float32)
+        )
+        return float(np.clip(shared / (mine + theirs - shared), 0.0, 1.0))
+
+
+def best_pixel(quality: FloatArray) -> tuple[int, int]:
+    """(row, col) of the highest quality (H, W); of a flat top, the pixel that lies deepest inside.
+
+    NaN and -inf never win; where nothing is finite the answer is (0, 0).
+    """
+    finite = np.where(np.isfinite(quality), quality, -np.inf)
+    top = finite >= finite.max()
+    if top.sum() > 1:
+        # a saturated detector would otherwise always be grasped at its top-left corner
+        depth_inside = cv2.distanceTransform(top.astype(np.uint8), cv2.DIST_L2, 3)
+        row, col = np.unravel_index(np.argmax(depth_inside), top.shape)
+    else:
+        row, col = np.unravel_index(np.argmax(top), top.shape)
+    return int(row), int(col)
+
+
+def peaks(
+    quality: FloatArray, *, threshold: float = 0.1, distance: float = 10.0, count: int | None = None
+) -> NDArray[np.intp]:
+    """Local maxima (n, 2) as (row, col), best first, at least `distance` [px] apart and above `threshold`.
+
+    Of maxima that are closer than that, the better one stays (non-maximum suppression).
+    """
+    image = np.where(np.isfinite(quality), quality, -1.0).astype(np.float32)
+    highest_around = cv2.dilate(image, np.ones((3, 3), np.uint8))
+    candidates = np.argwhere((image >= highest_around) & (image > threshold))
+    order = np.argsort(-image[candidates[:, 0], candidates[:, 1]], kind="stable")
+    candidates = candidates[order]
+    chosen: list[NDArray[np.intp]] = []
+    while len(candidates) and (count is None or len(chosen) < count):
+        best = candidates[0]
+        chosen.append(best)
+        apart = np.hypot(*(candidates - best).T) >= distance
+        apart[0] = False
+        candidates = candidates[apart]
+    return np.array(chosen, np.intp).reshape(-1, 2)

@@ -1,0 +1,1 @@
+"""Runs suites of episodes for detectors and controllers, counts what happened and writes it down."""

@@ -1,0 +1,31 @@
+"""Reaching controllers by name. They need numpy and OpenCV only, so that they run on a robot's computer."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from mpgrasp.exceptions import ConfigError
+
+if TYPE_CHECKING:
+    from mpgrasp.controllers.config import MppcConfig
+    from mpgrasp.controllers.controller import Controller
+
+CONTROLLERS: dict[str, str] = {
+    "mppc": "mpgrasp.controllers.mppc:Mppc",
+    "mvp": "mpgrasp.controllers.mvp:Mvp",
+    "open_loop": "mpgrasp.controllers.open_loop:OpenLoop",
+}
+"""Where each controller is; loaded when it is made."""
+
+
+def make_controller(name: str, config: MppcConfig | None = None) -> Controller:
+    """A controller by its name, with the settings of the preset "paper" unless others are given.
+
+    Raises:
+        ConfigError: there is no controller of that name.
+    """
+    if name not in CONTROLLERS:
+        raise ConfigError("unknown controller", got=name, allowed=CONTROLLERS)
+    module, _, attribute = CONTROLLERS[name].partition(":")
+    return getattr(import_module(module), attribute)(config)

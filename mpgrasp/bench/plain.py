@@ -1,0 +1,60 @@
+"""Configurations and results as plain JSON values."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SIGNIFICANT_DIGITS = 9
+"""Of floats in result files: more than anything here is measured to, fewer than the last bits."""
+
+
+def plain(value: Any) -> Any:
+    """JSON-ready copy: dataclasses and mappings as dicts, arrays and sequences as lists.
+
+    Floats keep `SIGNIFICANT_DIGITS`; NaN and infinities become None. What has no plain form is given
+    by its `repr`.
+    """
+    if value is None or (isinstance(value, bool | int | str) and not isinstance(value, Enum)):
+        return value
+    if isinstance(value, Enum):
+        return plain(value.value)
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        return float(f"{number:.{SIGNIFICANT_DIGITS}g}") if math.isfinite(number) else None
+    if isinstance(value, np.bool_ | np.integer):
+        return value.item()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(plain(key)): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted((plain(item) for item in value), key=str)
+    return str(value) if isinstance(value, Path) else repr(value)
+
+
+def one_line(record: Mapping[str, Any]) -> str:
+    """A record as one line of JSON with sorted keys and a line end: equal records, equal bytes."""
+    return json.dumps(plain(record), sort_keys=True, allow_nan=False, separators=(", ", ": ")) + "\n"
+
+
+def difference(a: Any, b: Any, where: str = "") -> str | None:
+    """The first place in which two plain values differ, as "path: a there, b here"; None if equal."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        for key in [*a, *(k for k in b if k not in a)]:
+            found = difference(a.get(key), b.get(key), f"{where}.{key}" if where else key)
+            if found:
+                return found
+        return None
+    return None if a == b else f"{where}: {json.dumps(a)} there, {json.dumps(b)} here"

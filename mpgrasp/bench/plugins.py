@@ -1,0 +1,119 @@
+"""Detectors and controllers by registry name, or by import path `module:Class` for your own.
+
+A class given by import path is called with no arguments, or, where weights are given for it, with
+`weights=Path(...)`. It must offer the methods of `GraspDetector` or of `Controller`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from mpgrasp.controllers.controller import Controller
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
+
+_DETECTOR_METHODS = ("reset", "predict")
+_CONTROLLER_METHODS = ("reset", "update", "final_grasp", "diagnostics")
+
+
+def detector_names() -> tuple[str, ...]:
+    """Names in the registry of detectors."""
+    from mpgrasp.detectors import DETECTORS
+
+    return tuple(DETECTORS)
+
+
+def controller_names() -> tuple[str, ...]:
+    """Names in the registry of controllers."""
+    from mpgrasp.controllers import CONTROLLERS
+
+    return tuple(CONTROLLERS)
+
+
+def check_name(kind: str, name: str, known: Iterable[str]) -> None:
+    """Raise ConfigError unless the name is in the registry or has the form of an import path."""
+    if ":" not in name and name not in known:
+        raise ConfigError(f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class"])
+
+
+def load_detector(name: str, weights: Path | None = None) -> GraspDetector:
+    """A detector, ready to use.
+
+    Raises:
+        ConfigError: an unknown name, or a plug-in that cannot be imported or made.
+        WeightsError: weights that are missing, unreadable or another network's.
+    """
+    check_name("detector", name, detector_names())
+    if weights is not None:
+        _check_readable(weights)
+    if ":" not in name:
+        from mpgrasp.detectors import make_detector
+
+        detector: GraspDetector = make_detector(name, weights=weights)
+        return detector
+    arguments = {} if weights is None else {"weights": weights}
+    return _make("detector", name, arguments, _DETECTOR_METHODS)
+
+
+def load_controller(name: str) -> Controller:
+    """A controller, ready to use.
+
+    Raises:
+        ConfigError: an unknown name, or a plug-in that cannot be imported or made.
+    """
+    check_name("controller", name, controller_names())
+    if ":" not in name:
+        from mpgrasp.controllers import make_controller
+
+        controller: Controller = make_controller(name)
+        return controller
+    return _make("controller", name, {}, _CONTROLLER_METHODS)
+
+
+def _check_readable(weights: Path) -> None:
+    if not weights.is_file():
+        raise WeightsError("no such weights file", got=str(weights), allowed="a file that exists")
+    try:
+        with weights.open("rb") as file:
+            file.read(1)
+    except OSError as error:
+        raise WeightsError(
+            "unreadable weights file", got=str(weights), allowed=f"a readable file ({error.strerror})"
+        ) from error
+
+
+def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str]) -> Any:
+    """An instance of the class at `module:Class`; whatever goes wrong in there becomes a ConfigError."""
+    module_name, _, class_name = path.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:
+        raise ConfigError(
+            f"{kind} plug-in cannot be imported ({type(error).__name__}: {error})",
+            got=path,
+            allowed="module:Class with the module in this directory or installed",
+        ) from error
+    factory = getattr(module, class_name, None)
+    if not callable(factory):
+        names = [n for n, item in vars(module).items() if isinstance(item, type) and not n.startswith("_")]
+        raise ConfigError(f"{kind} plug-in's module has no class {class_name!r}", got=path, allowed=names)
+    try:
+        made = factory(**arguments)
+    except MpgraspError:
+        raise
+    except Exception as error:
+        call = f"{class_name}({', '.join(f'{key}=...' for key in arguments)})"
+        raise ConfigError(
+            f"{kind} plug-in cannot be made ({type(error).__name__}: {error})",
+            got=path,
+            allowed=f"a class that can be called as {call}",
+        ) from error
+    missing = [name for name in methods if not callable(getattr(made, name, None))]
+    if missing:
+        raise ConfigError(
+            f"{kind} plug-in lacks {', '.join(missing)}", got=path, allowed=f"methods {', '.join(methods)}"
+        )
+    return made

@@ -1,0 +1,72 @@
+"""Where a run's numbers come from: versions, machine, commit, weights."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import mpgrasp
+from mpgrasp.paths import DATA_ROOT
+
+PACKAGES = (
+    "coacd",
+    "daqp",
+    "example-robot-data",
+    "mink",
+    "mujoco",
+    "numpy",
+    "opencv-python-headless",
+    "openvino",
+    "qpsolvers",
+    "scipy",
+    "torch",
+)
+"""Installed packages whose version may change a result."""
+
+
+def provenance() -> dict[str, Any]:
+    """Versions of mpgrasp, Python, packages and system, and the git commit of a checkout."""
+    return {
+        "mpgrasp": mpgrasp.__version__,
+        "git": git_state(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "machine": platform.machine(),
+        "packages": {name: version for name in PACKAGES if (version := _version(name))},
+    }
+
+
+def git_state() -> dict[str, Any] | None:
+    """Commit of the checkout that is running and whether files differ from it; None outside of one."""
+    if not (DATA_ROOT / ".git").exists():
+        return None
+    commit = _git("rev-parse", "HEAD")
+    changes = _git("status", "--porcelain", "--untracked-files=no")
+    return None if commit is None else {"commit": commit, "modified": bool(changes)}
+
+
+def sha256(file: Path) -> str:
+    """Hash of a file's content."""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _git(*arguments: str) -> str | None:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(DATA_ROOT), *arguments], capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()

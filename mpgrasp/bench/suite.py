@@ -1,0 +1,152 @@
+"""Benchmark suites: what is on the table in each episode, as declared in benchmarks/*.toml.
+
+A declaration has a `title`, a `[scene]` table with fields of `SceneConfig` that all episodes share,
+optionally `[[turns]]` (episode k takes turn k modulo their number, on top of `[scene]`), and optionally
+an `[episode]` table with fields of `EpisodeConfig`. Anything else is an error. benchmarks/README.md
+explains the format to users.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.paths import BENCHMARKS
+
+if TYPE_CHECKING:
+    from mpgrasp.episode import EpisodeConfig
+    from mpgrasp.scene import SceneConfig
+
+_TABLES = ("title", "scene", "turns", "episode")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """A named set of episodes."""
+
+    name: str
+    title: str
+    scenes: tuple[SceneConfig, ...]
+    """One per turn; episode k takes scene k modulo their number."""
+    episode: Mapping[str, Any] = field(default_factory=dict)
+    """Fields of `EpisodeConfig` in which this suite departs from the defaults."""
+
+    def __post_init__(self) -> None:
+        if not self.scenes:
+            raise ConfigError(f"suite {self.name!r} has no scene", allowed="one scene or more")
+
+    @property
+    def scene(self) -> SceneConfig:
+        """The scene of episode 0."""
+        return self.scene_config(0)
+
+    def scene_config(self, episode: int) -> SceneConfig:
+        """What is on the table in an episode, counted from 0."""
+        return self.scenes[episode % len(self.scenes)]
+
+    def episode_config(self, *, camera: str = "auto", noise: bool = True) -> EpisodeConfig:
+        """How an episode runs: the suite's settings with the caller's camera backend and noise switch.
+
+        Raises:
+            ConfigError: a setting that `EpisodeConfig` does not have, or refuses.
+        """
+        from mpgrasp.episode import EpisodeConfig
+
+        settings = {**self.episode, "camera_backend": camera, "noise": noise}
+        return _construct(EpisodeConfig, settings, f"suite {self.name!r}, [episode]")
+
+
+def suite_names() -> tuple[str, ...]:
+    """Names of the suites that ship with mpgrasp, in alphabetical order."""
+    return tuple(sorted(path.stem for path in BENCHMARKS.glob("*.toml")))
+
+
+def load_suite(name: str) -> Suite:
+    """The suite of a name in benchmarks/, or of a path to a declaration that ends in `.toml`.
+
+    Raises:
+        ConfigError: no such suite, or a declaration that cannot be used.
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+    elif name in suite_names():
+        path = BENCHMARKS / f"{name}.toml"
+    else:
+        raise ConfigError("unknown suite", got=name, allowed=[*suite_names(), "a path that ends in .toml"])
+    try:
+        declared = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            "unreadable suite", got=name, allowed=f"a readable file ({error.strerror})"
+        ) from error
+    except ValueError as error:  # TOMLDecodeError, UnicodeDecodeError
+        raise ConfigError("suite is not valid TOML", got=name, allowed=f"TOML 1.0 ({error})") from error
+    return parse_suite(path.stem, declared)
+
+
+def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
+    """The suite that a declaration, already read from TOML, describes.
+
+    Raises:
+        ConfigError: a key that is unknown, or a value that cannot be used.
+    """
+    from mpgrasp.scene import SceneConfig
+
+    where = f"suite {name!r}"
+    _refuse_unknown(declared, _TABLES, where)
+    title = declared.get("title")
+    if not isinstance(title, str) or not title:
+        raise ConfigError(f"{where} has no title", got=title, allowed='title = "..."')
+    shared, turns = declared.get("scene", {}), declared.get("turns", [{}])
+    episode = declared.get("episode", {})
+    for key, table in (("scene", shared), ("episode", episode)):
+        if not isinstance(table, dict):
+            raise ConfigError(f"{where}, {key} is not a table", got=table, allowed=f"[{key}]")
+    if not isinstance(turns, list) or not all(isinstance(turn, dict) for turn in turns):
+        raise ConfigError(f"{where}, turns is not a list of tables", got=turns, allowed="[[turns]]")
+    scenes = tuple(_construct(SceneConfig, {**shared, **turn}, f"{where}, [scene]") for turn in turns)
+    return Suite(name=name, title=title, scenes=scenes, episode=_as_tuples(episode))
+
+
+def episode_seed(suite: str, seed: int, episode: int) -> int:
+    """Seed of one episode: 32 bits that depend on the suite's name, the run's seed and the episode alone.
+
+    Scene, sensor noise and start pose follow from it, so that every detector and every controller
+    meets the same worlds, and two suites never share one. It is the first word of numpy's
+    SeedSequence over (crc32 of the suite's name, seed, episode).
+    """
+    if seed < 0 or episode < 0:
+        raise ConfigError("negative seed or episode", got=(seed, episode), allowed="0, 1, 2, ...")
+    entropy = [zlib.crc32(suite.encode()), seed, episode]
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])
+
+
+def _construct(kind: Any, settings: Mapping[str, Any], where: str) -> Any:
+    """An instance of a config dataclass from declared settings, with errors that name the place."""
+    _refuse_unknown(settings, [f.name for f in dataclasses.fields(kind)], where)
+    try:
+        return kind(**_as_tuples(settings))
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"{where}: {error}") from error
+
+
+def _refuse_unknown(table: Mapping[str, Any], allowed: Iterable[str], where: str) -> None:
+    allowed = list(allowed)
+    for key in table:
+        if key not in allowed:
+            raise ConfigError(f"{where}: unknown key", got=key, allowed=allowed)
+
+
+def _as_tuples(value: Any) -> Any:
+    """TOML arrays as tuples, which frozen configs can hold."""
+    if isinstance(value, dict):
+        return {key: _as_tuples(item) for key, item in value.items()}
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value

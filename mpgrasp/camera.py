@@ -1,0 +1,185 @@
+"""The wrist depth camera: the same image rasterised through OpenGL or ray-cast without any GL.
+
+MuJoCo's camera axes (x right, y up, z backward) become OpenCV's (x right, y down, z forward) here and
+nowhere else.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+from dataclasses import replace
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp import sensor_noise
+from mpgrasp.depth import CameraIntrinsics, DepthFrame
+from mpgrasp.exceptions import CameraError, ConfigError
+from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.rasteriser import FAR, NEAR, Rasteriser, gl_context
+from mpgrasp.sensor_noise import DepthNoise
+
+D435_INTRINSICS = CameraIntrinsics(fx=385.0, fy=385.0, cx=319.5, cy=239.5, width=640, height=480)
+"""Intel RealSense D435, depth stream of 640 x 480 px."""
+BACKENDS = ("auto", "gl", "ray")
+WRIST = "panda/wrist"
+
+_MUJOCO_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+_DEFAULT_NOISE = DepthNoise()
+_log = logging.getLogger(__name__)
+
+
+class WristCamera:
+    """Depth images of a model from one of its cameras, or from any pose.
+
+    Args:
+        model: the world.
+        backend: "gl", "ray" or "auto", which takes GL where there is one.
+        noise: sensor model, or None for perfect depth.
+        camera: name of the camera in the model; the model may lack it where only `render` is used.
+        intrinsics: geometry of the sensor's whole image.
+        crop: side of the central square of the image that is wanted [px]; None for all of it. Nothing else is
+            computed, apart from the margin that the noise needs, and frames have this size.
+        geom_groups: the geom groups that are seen (MuJoCo's convention: 0-2 visual, 3-5 hidden).
+
+    Raises:
+        ConfigError: unknown backend, or a crop larger than the image.
+        CameraError: backend "gl" without GL.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        backend: str = "auto",
+        noise: DepthNoise | None = _DEFAULT_NOISE,
+        *,
+        camera: str = WRIST,
+        intrinsics: CameraIntrinsics = D435_INTRINSICS,
+        crop: int | None = None,
+        geom_groups: tuple[int, ...] = (0, 1, 2),
+    ) -> None:
+        if backend not in BACKENDS:
+            raise ConfigError("unknown camera backend", got=backend, allowed=BACKENDS)
+        self.backend: Literal["gl", "ray"] = "ray" if backend == "ray" or not _gl_usable(backend) else "gl"
+        self.noise = noise
+        self.intrinsics = intrinsics if crop is None else intrinsics.centre_crop(crop)
+        # the shadow of an edge depends on what lies to its right, so that much more is looked at
+        margin = 0 if noise is None or crop is None else noise.margin_px(intrinsics)
+        self._model = model
+        self._camera = camera
+        self._geom_groups = geom_groups
+        self._seen = replace(self.intrinsics, width=self.intrinsics.width + margin)
+        self._depth_rasteriser: Rasteriser | None = None
+        self._colour_rasteriser: Rasteriser | None = None
+
+    def pose(self, data: mujoco.MjData) -> FloatArray:
+        """`T_world_camera` (4, 4) of the model's camera, OpenCV axes, as of the last forward kinematics."""
+        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA.value, self._camera)
+        if index < 0:
+            names = [self._model.camera(i).name for i in range(self._model.ncam)]
+            raise CameraError("the model has no such camera", got=self._camera, allowed=names or "none in this model")
+        return transform(data.cam_xmat[index].reshape(3, 3) @ _MUJOCO_TO_OPENCV, data.cam_xpos[index])
+
+    def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
+        """What the sensor reports from the model's camera, noise included unless it is None."""
+        return self.render(data, self.pose(data), rng)
+
+    def true_frame(self, data: mujoco.MjData) -> DepthFrame:
+        """Perfect depth from the model's camera."""
+        return self.render(data, self.pose(data))
+
+    def render(
+        self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator | None = None
+    ) -> DepthFrame:
+        """Depth from an OpenCV camera at `T_world_camera` (4, 4); with the sensor's noise if `rng` is given."""
+        depth = self._depth(data, T_world_camera)
+        if rng is not None and self.noise is not None:
+            depth = sensor_noise.apply(depth, self._seen, rng, self.noise)
+        depth = np.ascontiguousarray(depth[:, : self.intrinsics.width])
+        return DepthFrame(
+            depth=depth, intrinsics=self.intrinsics, T_world_camera=T_world_camera, time=float(data.time)
+        )
+
+    def rgb(self, data: mujoco.MjData, T_world_camera: FloatArray | None = None) -> NDArray[np.uint8]:
+        """Colour image (H, W, 3) with the geometry of the frames, for recordings; needs GL.
+
+        Raises:
+            CameraError: there is no GL on this machine.
+        """
+        if self._colour_rasteriser is None:
+            self._colour_rasteriser = Rasteriser(
+                self._model, self.intrinsics, colour=True, geom_groups=self._geom_groups
+            )
+        return self._colour_rasteriser.render(data, self.pose(data) if T_world_camera is None else T_world_camera)
+
+    def close(self) -> None:
+        """Free GL resources; a later image makes new ones."""
+        for rasteriser in (self._depth_rasteriser, self._colour_rasteriser):
+            if rasteriser is not None:
+                rasteriser.close()
+        self._depth_rasteriser = self._colour_rasteriser = None
+
+    def _depth(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.float32]:
+        if self.backend == "ray":
+            return ray_cast(self._model, data, self._seen, T_world_camera, self._geom_groups)
+        if self._depth_rasteriser is None:
+            self._depth_rasteriser = Rasteriser(self._model, self._seen, geom_groups=self._geom_groups)
+        return self._depth_rasteriser.render(data, T_world_camera)
+
+
+def ray_cast(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    intrinsics: CameraIntrinsics,
+    T_world_camera: FloatArray,
+    geom_groups: tuple[int, ...] = (0, 1, 2),
+) -> NDArray[np.float32]:
+    """Z-depth (H, W) [m] by one ray through every pixel's centre; NaN where nothing is hit."""
+    rays = _pixel_rays(intrinsics)
+    # rays have unit z, not unit length, so that MuJoCo's distance along them is the z-depth
+    directions = rays @ T_world_camera[:3, :3].T
+    groups = np.array([group in geom_groups for group in range(mujoco.mjNGROUP)], np.uint8)
+    n = len(directions)
+    distance, geom = np.empty(n), np.empty(n, np.int32)
+    origin = np.ascontiguousarray(T_world_camera[:3, 3], float)
+    mujoco.mj_multiRay(
+        model, data, origin, directions.reshape(-1), groups, True, -1, geom, distance, None, n, FAR
+    )
+    for i in np.flatnonzero((distance >= 0) & (distance < NEAR)):
+        # look past what the near plane of the rasterised image would cut away
+        distance[i] = mujoco.mj_ray(
+            model, data, origin + NEAR * directions[i], directions[i], groups, True, -1, geom[:1]
+        )
+        distance[i] += NEAR if distance[i] >= 0 else 0
+    distance[(distance < 0) | (distance > FAR)] = np.nan
+    return distance.astype(np.float32).reshape(intrinsics.height, intrinsics.width)
+
+
+@functools.lru_cache(maxsize=8)
+def _pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
+    """Camera-frame directions (H * W, 3) of all pixels, scaled to z = 1."""
+    v, u = np.indices((intrinsics.height, intrinsics.width))
+    rays = intrinsics.deproject(u, v, np.ones(u.shape)).reshape(-1, 3)
+    rays.flags.writeable = False
+    return rays
+
+
+def _gl_usable(backend: str) -> bool:
+    """Whether GL works here; under "gl" it must, under "auto" the log says once that it does not."""
+    if backend == "gl":
+        gl_context()
+        return True
+    return _gl_or_notice()
+
+
+@functools.cache
+def _gl_or_notice() -> bool:
+    try:
+        gl_context()
+    except CameraError as error:
+        _log.warning("no OpenGL here, so the camera casts rays instead (same images, slower): %s", error)
+        return False
+    return True

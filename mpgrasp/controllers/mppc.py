@@ -1,0 +1,61 @@
+"""MP-PC, the paper's multi-view perceptual planning controller (Algorithm 1)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp.controllers.reaching import ReachingController
+from mpgrasp.geometry import FloatArray
+from mpgrasp.grasp import Grasp, GraspMap, best_pixel
+from mpgrasp.grid_map import GridMap
+
+
+class Mppc(ReachingController):
+    """Moves sideways at alpha of the speed while the quality map has no peak, and in the end takes the
+    best of the pool B, which holds the best grasp of every view.
+    """
+
+    name = "mppc"
+
+    def reset(self, seed: int) -> None:
+        super().reset(seed)
+        self.pool: list[Grasp] = []
+
+    def final_grasp(self) -> Grasp | None:
+        """Line 17: the best grasp of the pool; of equals the latest, which was seen from nearest by."""
+        best = max(reversed(self.pool), key=lambda grasp: grasp.quality, default=None)
+        return best if best is not None and best.quality >= self.config.min_quality else None
+
+    def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
+        grasp = best_grasp_in_view(grasp_map, cells, self.grid)
+        if grasp is not None:
+            self.pool.append(grasp)
+
+    def _attenuation(self, grasp_map: GraspMap) -> float:
+        height = peak_height(grasp_map.quality)
+        exists = height > self.config.peak_threshold
+        self._diagnostics |= {"peak": exists, "peak_height": height}
+        return 1.0 if exists else self.config.alpha
+
+
+def peak_height(quality: FloatArray) -> float:
+    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
+    finite = np.nan_to_num(quality).astype(np.float32)
+    return float(cv2.blur(finite, (3, 3), borderType=cv2.BORDER_REPLICATE).max())
+
+
+def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:
+    """Lines 11-14: the grasp of the best pixel whose point lies in the workspace; None where none does.
+
+    `cells` (H, W) is what `GridMap.update` returned for this view. Quality is lowered around remembered
+    failures.
+    """
+    if (cells < 0).all():
+        return None
+    quality = grasp_map.quality - grid.failures.ravel()[cells]
+    row, col = best_pixel(np.where(cells >= 0, quality, -np.inf))
+    return replace(grasp_map.grasp_at(row, col), quality=float(np.clip(quality[row, col], 0.0, 1.0)))

@@ -1,0 +1,126 @@
+"""What MP-PC and its baseline MVP share: fuse a view, find the best viewpoint near by, go there and down."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.controller import Command, Observation
+from mpgrasp.entropy import exploration_cost, grid_entropy, information_gain, utility
+from mpgrasp.geometry import FloatArray, wrap_half_pi, wrap_pi
+from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.grid_map import GridMap
+
+_TIE = 1e-3
+"""Utilities closer to the best than this fraction of the range in the window are equally good."""
+_TIE_NAT = 1e-6
+"""And so are utilities closer than this: single precision makes no better difference [nat]."""
+_YAW_SLACK = np.deg2rad(15)
+"""How far beyond the yaw range a grasp may lie before the hand turns the other way to meet it [rad]."""
+
+
+class ReachingController(ABC):
+    """Algorithm 1 without what tells MP-PC from MVP; those are the subclasses."""
+
+    name: str
+
+    def __init__(self, config: MppcConfig | None = None) -> None:
+        self.config = config or MppcConfig()
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        self.grid = GridMap(self.config.grid)
+        # where nothing tells directions apart the arm explores in a random one, and sticks to it
+        heading = np.random.default_rng(seed).uniform(-np.pi, np.pi)
+        self._heading = np.array([np.cos(heading), np.sin(heading)])
+        self._diagnostics: dict[str, FloatArray | float | bool] = {}
+
+    def remember_failure(self, position: FloatArray) -> None:
+        """Lower quality around a failed grasp at world (3,) [m]; to be told anew after each `reset`."""
+        self.grid.suppress(position)
+
+    def update(self, observation: Observation) -> Command:
+        config, grasp_map, tcp = self.config, observation.grasp_map, observation.T_world_tcp
+        self._look(grasp_map, self.grid.update(grasp_map))
+
+        viewpoint = grasp_map.T_world_camera[:3, 3]
+        map_of_utility = self._evaluate(grasp_map, float(tcp[2, 3]))
+        target = self._best_viewpoint(map_of_utility, viewpoint[:2])
+        pull = (target - viewpoint[:2]) / config.window
+        velocity = config.v_1 * pull / max(1.0, float(np.linalg.norm(pull)))
+        velocity = velocity * self._attenuation(grasp_map)
+
+        grasp = self.final_grasp()
+        yaw_rate = 0.0 if grasp is None else self._yaw_rate(grasp.angle, tcp)
+        done = bool(tcp[2, 3] <= config.z_min)
+        twist = np.zeros(6) if done else np.array([*velocity, -config.v_z, 0.0, 0.0, yaw_rate])
+        self._diagnostics |= {
+            "viewpoint_x": float(target[0]),
+            "viewpoint_y": float(target[1]),
+            "best_quality": 0.0 if grasp is None else grasp.quality,
+        }
+        return Command(twist=twist, gripper=config.gripper_open, done=done)
+
+    @abstractmethod
+    def final_grasp(self) -> Grasp | None: ...
+
+    def diagnostics(self) -> dict[str, FloatArray | float | bool]:
+        return dict(self._diagnostics)
+
+    @abstractmethod
+    def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
+        """Take from one view what the grid does not; `cells` (H, W) is -1 where the grid dropped a pixel."""
+
+    @abstractmethod
+    def _attenuation(self, grasp_map: GraspMap) -> float:
+        """Factor of the horizontal velocity."""
+
+    def _evaluate(self, grasp_map: GraspMap, height: float) -> FloatArray:
+        """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
+        c, k = self.config, grasp_map.intrinsics
+        # a sixth of the field of view where it meets the table, in cells; mean of both image sides
+        view = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
+        entropy = grid_entropy(self.grid, c.prior_count)
+        gain = information_gain(entropy, max(view, 0.0) / 6 / c.grid.cell, c.border)
+        best = self.grid.best_cell()
+        centre = None if best is None else self.grid.position(best)
+        cost = exploration_cost(self.grid, centre, (height - c.z_min) / (c.z_max - c.z_min))
+        result = utility(gain, cost, c.gamma)
+        self._diagnostics = {
+            "entropy": entropy,
+            "information_gain": gain,
+            "utility": result,
+            "mean_quality": self.grid.mean_quality(),
+        }
+        return result
+
+    def _best_viewpoint(self, values: FloatArray, camera: FloatArray) -> FloatArray:
+        """World (x, y) of the best utility within the window around the camera's (x, y).
+
+        Where several are equally good, the one farthest along the episode's random heading, so that the
+        choice is a direction and not the order of the array. Off the grid, its nearest cell.
+        """
+        x, y = self.grid.axes()
+        dx, dy = x - camera[0], (y - camera[1])[:, None]
+        distance = np.hypot(dx, dy)  # (ny, nx)
+        near = distance <= max(self.config.window, float(distance.min()))
+        best, worst = values[near].max(), values[near].min()
+        tied = near & (values >= best - max(_TIE_NAT, _TIE * (best - worst)))
+        along = np.where(tied, dx * self._heading[0] + dy * self._heading[1], -np.inf)
+        row, col = np.unravel_index(np.argmax(along), along.shape)
+        return self.grid.position((int(row), int(col)))
+
+    def _yaw_rate(self, angle: float, T_world_tcp: FloatArray) -> float:
+        """Yaw rate [rad/s] towards closing direction `angle`, by the smaller turn that stays in range."""
+        c = self.config
+        closing = np.arctan2(T_world_tcp[1, 1], T_world_tcp[0, 1])
+        yaw = float(wrap_pi(np.arctan2(T_world_tcp[1, 0], T_world_tcp[0, 0]) - c.home_yaw))
+        goal = yaw + float(wrap_half_pi(angle - closing))
+        if abs(goal) > c.yaw_range + _YAW_SLACK:
+            goal -= np.copysign(np.pi, goal)
+        # within the slack the hand waits at the end of its range; the grasp itself turns the rest
+        goal = float(np.clip(goal, -c.yaw_range, c.yaw_range))
+        return float(np.clip(c.yaw_gain * (goal - yaw), -c.yaw_rate_max, c.yaw_rate_max))

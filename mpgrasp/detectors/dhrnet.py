@@ -1,0 +1,223 @@
+"""DHRNet: a grasp network that keeps high resolution throughout and exchanges features between resolutions.
+
+The paper's Section III-B: a convolutional stem, four stages with one to four parallel branches of residual blocks,
+fuse layers between them (3x3 stride-2 convolutions down, bilinear up), and heads that see all branches (Fig. 9b).
+The layout of branches and fuse layers is HRNet's (Wang et al., https://arxiv.org/abs/1908.07919), which the authors'
+own code uses too: `DHRNetConfig(**AUTHORS)` has their 65.9 M parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from mpgrasp.exceptions import ConfigError
+
+BN_MOMENTUM = 0.1
+"""The paper's Section IV-A."""
+EXPANSION = 4
+"""Output channels of a bottleneck block, in units of its width."""
+AUTHORS = {
+    "width": 48,
+    "modules": (1, 4, 3),
+    "blocks": 4,
+    "stem_width": 64,
+    "stem_blocks": 4,
+    "bottleneck": True,
+    "head_width": 720,
+    "fine_head": False,
+}
+"""Settings of the authors' own code."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DHRNetConfig:
+    """Size of a DHRNet; the defaults are the one whose weights are shipped."""
+
+    channels: int = 1
+    """Input channels."""
+    width: int = 16
+    """Channels of the finest branch; each coarser one has twice as many."""
+    modules: tuple[int, ...] = (1, 1, 1)
+    """Modules (parallel residual blocks, then a fuse layer) in the stages of 2, 3 and 4 branches."""
+    blocks: int = 2
+    """Residual blocks per branch and module."""
+    stem_width: int = 32
+    """Channels of the stem and of the first stage."""
+    stem_blocks: int = 1
+    """Residual blocks of the first stage."""
+    bottleneck: bool = False
+    """First stage of bottleneck blocks, four times as wide at their ends, instead of plain residual blocks."""
+    head_width: int = 32
+    """Channels into which the heads take all branches together."""
+    fine_head: bool = True
+    """Heads at half of the input's resolution, with the stem's features of that resolution beside the branches'
+    (which begin at a quarter): thin objects are few pixels wide."""
+
+    def __post_init__(self) -> None:
+        # JSON knows no tuples
+        object.__setattr__(self, "modules", tuple(self.modules))
+        sizes = (self.channels, self.width, self.blocks, self.stem_width, self.stem_blocks, self.head_width)
+        if len(self.modules) != 3 or min(*sizes, *self.modules) < 1:
+            raise ConfigError(
+                "unusable DHRNet settings", got=self, allowed="sizes of 1 or more, three counts of modules"
+            )
+
+
+class DHRNet(nn.Module):
+    """(n, channels, H, W) -> pos, cos, sin and width, each (n, 1, H, W); H and W are multiples of 32."""
+
+    def __init__(self, config: DHRNetConfig | None = None) -> None:
+        super().__init__()
+        self.config = c = config or DHRNetConfig()
+        self.stem_half = _conv_bn(c.channels, c.stem_width, 3, stride=2)
+        self.stem_quarter = _conv_bn(c.stem_width, c.stem_width, 3, stride=2)
+        block = _Bottleneck if c.bottleneck else _Residual
+        first = c.stem_width * (EXPANSION if c.bottleneck else 1)
+        self.stage1 = nn.Sequential(
+            *(block(c.stem_width if k == 0 else first, c.stem_width) for k in range(c.stem_blocks))
+        )
+        self.transitions, self.stages = nn.ModuleList(), nn.ModuleList()
+        before = [first]
+        for branches, modules in enumerate(c.modules, start=2):
+            widths = [c.width * 2**k for k in range(branches)]
+            self.transitions.append(_Transition(before, widths))
+            self.stages.append(nn.Sequential(*(_Module(widths, c.blocks) for _ in range(modules))))
+            before = widths
+        self.head = _AllBranches(before, c.head_width)
+        self.fine = _conv_bn(c.head_width + c.stem_width, c.head_width, 3) if c.fine_head else None
+        for name in ("pos", "cos", "sin", "width"):
+            self.add_module(f"{name}_output", nn.Conv2d(c.head_width, 1, 1))
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
+        for name in ("pos", "cos", "sin", "width"):
+            # start near the mean of a sparse target, so that the first steps are not spent on the background
+            nn.init.normal_(getattr(self, f"{name}_output").weight, std=0.01)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        half = self.stem_half(x)  # (n, stem_width, H/2, W/2)
+        branches = [self.stage1(self.stem_quarter(half))]
+        for transition, stage in zip(self.transitions, self.stages, strict=True):
+            branches = stage(transition(branches))
+        features = self.head(branches)  # (n, head_width, H/4, W/4)
+        if self.fine is not None:
+            features = self.fine(torch.cat([_resize(features, half), half], dim=1))
+        weight = torch.cat([h.weight for h in self._heads()])
+        bias = torch.cat([h.bias for h in self._heads()])
+        maps = _resize(F.conv2d(features, weight, bias).float(), x)  # (n, 4, H, W)
+        pos, cos, sin, width = maps.split(1, dim=1)
+        return pos, cos, sin, width
+
+    def _heads(self) -> list[nn.Conv2d]:
+        return [self.pos_output, self.cos_output, self.sin_output, self.width_output]
+
+
+def _resize(x: Tensor, like: Tensor) -> Tensor:
+    return F.interpolate(x, size=like.shape[-2:], mode="bilinear", align_corners=False)
+
+
+def _conv_bn(inputs: int, outputs: int, kernel: int, *, stride: int = 1, relu: bool = True) -> nn.Sequential:
+    layers: list[nn.Module] = [
+        nn.Conv2d(inputs, outputs, kernel, stride=stride, padding=kernel // 2, bias=False),
+        nn.BatchNorm2d(outputs, momentum=BN_MOMENTUM),
+    ]
+    return nn.Sequential(*layers, nn.ReLU(inplace=True)) if relu else nn.Sequential(*layers)
+
+
+class _Residual(nn.Module):
+    def __init__(self, inputs: int, width: int) -> None:
+        super().__init__()
+        self.body = nn.Sequential(
+            *_conv_bn(inputs, width, 3),
+            *_conv_bn(width, width, 3, relu=False),
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.relu(self.body(x).add_(x), inplace=True)
+
+
+class _Bottleneck(nn.Module):
+    def __init__(self, inputs: int, width: int) -> None:
+        super().__init__()
+        outputs = width * EXPANSION
+        self.body = nn.Sequential(
+            *_conv_bn(inputs, width, 1),
+            *_conv_bn(width, width, 3),
+            *_conv_bn(width, outputs, 1, relu=False),
+        )
+        self.skip = nn.Identity() if inputs == outputs else _conv_bn(inputs, outputs, 1, relu=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.relu(self.body(x) + self.skip(x), inplace=True)
+
+
+class _Transition(nn.Module):
+    """Branches of the last stage -> branches of the next, which has one coarser branch more."""
+
+    def __init__(self, before: list[int], widths: list[int]) -> None:
+        super().__init__()
+        self.same = nn.ModuleList(
+            nn.Identity() if a == b else _conv_bn(a, b, 3) for a, b in zip(before, widths, strict=False)
+        )
+        self.coarser = _conv_bn(before[-1], widths[-1], 3, stride=2)
+
+    def forward(self, x: list[Tensor]) -> list[Tensor]:
+        return [*(f(b) for f, b in zip(self.same, x, strict=True)), self.coarser(x[-1])]
+
+
+class _Module(nn.Module):
+    """Parallel branches of residual blocks, then a fuse layer that sums what each branch makes of all others."""
+
+    def __init__(self, widths: list[int], blocks: int) -> None:
+        super().__init__()
+        self.branches = nn.ModuleList(
+            nn.Sequential(*(_Residual(w, w) for _ in range(blocks))) for w in widths
+        )
+        self.fuse = nn.ModuleList(
+            nn.ModuleList(_fuse(widths, source, target) for source in range(len(widths)))
+            for target in range(len(widths))
+        )
+
+    def forward(self, x: list[Tensor]) -> list[Tensor]:
+        x = [branch(b) for branch, b in zip(self.branches, x, strict=True)]
+        fused = []
+        for target, sources in enumerate(self.fuse):
+            total = x[target]
+            for source, f in enumerate(sources):
+                if source != target:
+                    y = f(x[source])
+                    total = total + (_resize(y, x[target]) if source > target else y)
+            fused.append(F.relu(total, inplace=True))
+        return fused
+
+
+def _fuse(widths: list[int], source: int, target: int) -> nn.Module:
+    if source == target:
+        return nn.Identity()
+    if source > target:  # coarse to fine: fewer channels here, bilinear up in the forward pass
+        return _conv_bn(widths[source], widths[target], 1, relu=False)
+    steps = [_conv_bn(widths[source], widths[source], 3, stride=2) for _ in range(target - source - 1)]
+    return nn.Sequential(*steps, _conv_bn(widths[source], widths[target], 3, stride=2, relu=False))
+
+
+class _AllBranches(nn.Module):
+    """Fig. 9b: all branches brought to the finest one's size, concatenated, and mixed by a 1x1 convolution.
+
+    The mixing runs before the resizing, branch by branch, and is summed afterwards: the same linear map at a
+    fraction of the cost.
+    """
+
+    def __init__(self, widths: list[int], outputs: int) -> None:
+        super().__init__()
+        self.mix = nn.ModuleList(nn.Conv2d(w, outputs, 1, bias=False) for w in widths)
+        self.norm = nn.BatchNorm2d(outputs, momentum=BN_MOMENTUM)
+
+    def forward(self, x: list[Tensor]) -> Tensor:
+        total = self.mix[0](x[0])
+        for f, b in zip(list(self.mix)[1:], x[1:], strict=True):
+            total = total + _resize(f(b), x[0])
+        return F.relu(self.norm(total), inplace=True)

@@ -1,0 +1,255 @@
+"""One closed-loop grasp attempt: look and move at 10 Hz from z_max to z_min, then grasp, lift, judge.
+
+The scene, the start pose and the sensor noise depend on the seed alone, so that every detector and
+every controller meets the same world: the noise of a tick is drawn anew from (seed, tick).
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mpgrasp.camera import BACKENDS, WristCamera
+from mpgrasp.controllers.controller import Controller, Observation
+from mpgrasp.depth import DepthFrame
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.episode_result import EpisodeResult, Outcome
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.execution import ExecutionConfig, ExecutionResult, execute_grasp
+from mpgrasp.geometry import FloatArray, invert, looking_down
+from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.ik import solve_pose
+from mpgrasp.motion import ArmDriver, MotionStatistics
+from mpgrasp.recording import NullRecorder, Recorder, TickRecord
+from mpgrasp.scene import WORKSPACE_CENTRE, SceneConfig, build_scene
+from mpgrasp.sensor_noise import DepthNoise
+from mpgrasp.simulation import Simulation
+
+STAGES = ("render", "detect", "control", "ik", "physics")
+"""What a control tick of the reach spends its time on."""
+
+# streams of an episode's seed beside those of the scene
+_NOISE_STREAM = 11
+_START_STREAM = 12
+_TICK_PERIOD = 0.1  # [s], between two records of a recording once the reach is over
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeConfig:
+    """How an episode runs, whatever the detector and the controller."""
+
+    control_dt: float = 0.1
+    """Period of the control tick: image, detection, decision [s]."""
+    start_height: float = 0.50
+    """Height of the tool point over the table at the start [m], Table I's z_max."""
+    start_jitter: float = 0.05
+    """Standard deviation of the first viewpoint about the workspace's centre, in x and in y [m]; drawn
+    within two standard deviations."""
+    max_reach_time: float = 20.0
+    """A reach that takes longer is a timeout [s]."""
+    camera_backend: str = "auto"
+    """auto, gl or ray."""
+    camera_crop: int | None = 350
+    """Central square of the 640 x 480 image that is rendered [px]; None for the whole image."""
+    noise: bool = True
+    """Whether the depth camera is as noisy as a D435."""
+    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
+    """How the chosen grasp is executed and judged."""
+
+    def __post_init__(self) -> None:
+        for name in ("control_dt", "start_height", "max_reach_time"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        if self.start_jitter < 0:
+            raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
+        if self.camera_backend not in BACKENDS:
+            raise ConfigError("unknown camera backend", got=self.camera_backend, allowed=BACKENDS)
+
+
+def run_episode(
+    scene_config: SceneConfig,
+    seed: int,
+    *,
+    detector: GraspDetector,
+    controller: Controller,
+    config: EpisodeConfig | None = None,
+    recorder: Recorder | None = None,
+) -> EpisodeResult:
+    """Play one episode from the settled scene to the verdict of physics.
+
+    Args:
+        scene_config: what is on the table.
+        seed: of the scene, the start pose and the sensor noise; 0 is a seed.
+        detector: is reset, then asked once a tick.
+        controller: is reset, then asked once a tick.
+        config: how the episode runs.
+        recorder: is shown every tick.
+
+    Raises:
+        ConfigError: a scene that cannot be built.
+        CameraError: a camera backend that this machine does not have.
+    """
+    episode = _Episode(scene_config, seed, config or EpisodeConfig(), recorder or NullRecorder())
+    try:
+        return episode.play(detector, controller)
+    finally:
+        episode.camera.close()
+
+
+class _Episode:
+    """The pieces of one running episode."""
+
+    def __init__(
+        self, scene_config: SceneConfig, seed: int, config: EpisodeConfig, recorder: Recorder
+    ) -> None:
+        self.config, self.seed, self.recorder = config, seed, recorder
+        self.scene = build_scene(scene_config, seed)
+        self.simulation = Simulation(self.scene)
+        self.camera = WristCamera(
+            self.scene.model,
+            config.camera_backend,
+            DepthNoise() if config.noise else None,
+            crop=config.camera_crop,
+        )
+        self.simulation.set_q(self._start_q())
+        self.driver = ArmDriver(self.simulation)
+        self.start_time = self.simulation.time
+        self.ticks = 0
+        self._times: dict[str, list[float]] = defaultdict(list)
+        self._last_record = -np.inf
+        self._grasp: Grasp | None = None
+
+    def play(self, detector: GraspDetector, controller: Controller) -> EpisodeResult:
+        """Reach, grasp, judge."""
+        self.recorder.start(self.simulation)
+        detector.reset(self.scene.height_map())
+        controller.reset(self.seed)
+        outcome = self._reach(detector, controller)
+        reach = self.driver.statistics()
+        lifted: str | None = None
+        if outcome is None:
+            self._grasp = controller.final_grasp()
+            outcome = Outcome.NO_GRASP if self._grasp is None else None
+        if outcome is None and self._grasp is not None:
+            execution = execute_grasp(
+                self.driver, self._grasp, self.config.execution, on_tick=self._record_execution
+            )
+            outcome, lifted = _judge(execution), execution.lifted
+        assert outcome is not None
+        self.recorder.finish(self._verdict(outcome))
+        return self._result(outcome, lifted, reach)
+
+    def _reach(self, detector: GraspDetector, controller: Controller) -> Outcome | None:
+        """Control ticks until the controller is done; an outcome where the episode ends before."""
+        while self.simulation.time - self.start_time < self.config.max_reach_time:
+            rng = np.random.default_rng([self.seed, _NOISE_STREAM, self.ticks])
+            with self._timed("render"):
+                frame = self.camera.capture(self.simulation.data, rng)
+            with self._timed("detect"):
+                grasp_map = detector.predict(frame)
+            with self._timed("control"):
+                command = controller.update(
+                    Observation(
+                        time=self.simulation.time - self.start_time,
+                        T_world_tcp=self.simulation.T_world_tcp,
+                        grasp_map=grasp_map,
+                    )
+                )
+            self.ticks += 1
+            self.simulation.open_gripper(command.gripper)
+            before = self.driver.statistics()
+            if not command.done:
+                self.driver.drive(command.twist, self.config.control_dt)
+                after = self.driver.statistics()
+                self._times["ik"].append(after.ik_seconds - before.ik_seconds)
+                self._times["physics"].append(after.physics_seconds - before.physics_seconds)
+            self._record("reach", frame, grasp_map, controller.diagnostics())
+            if self.driver.reflex is not None:
+                return Outcome.REFLEX
+            if command.done:
+                return None
+        return Outcome.TIMEOUT
+
+    def _start_q(self) -> FloatArray:
+        """Arm posture that puts the camera over the jittered start, looking straight down."""
+        rng = np.random.default_rng([self.seed, _START_STREAM])
+        jitter = np.clip(rng.standard_normal(2), -2, 2) * self.config.start_jitter
+        simulation = self.simulation
+        T_tcp_camera = invert(simulation.T_world_tcp) @ self.camera.pose(simulation.data)
+        T = looking_down([*(np.array(WORKSPACE_CENTRE) + jitter), self.config.start_height])
+        T[:2, 3] -= (T[:3, :3] @ T_tcp_camera[:3, 3])[:2]
+        return solve_pose(simulation.q, T)
+
+    def _result(self, outcome: Outcome, lifted: str | None, reach: MotionStatistics) -> EpisodeResult:
+        whole = self.driver.statistics()
+        return EpisodeResult(
+            outcome=outcome,
+            object=lifted or self._target(),
+            sim_time_s=self.simulation.time - self.start_time,
+            ticks=self.ticks,
+            reflex=self.driver.reflex,
+            min_singular_value=whole.min_singular_value,
+            near_singularity_s=whole.near_singularity,
+            path_length_m=reach.path_length,
+            jerk_rms=reach.jerk_rms,
+            grasp=self._grasp,
+            timing={stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES},
+            state_hash=self.simulation.state_hash(),
+        )
+
+    def _target(self) -> str:
+        """The object nearest to the chosen grasp; the scene's first where there is none."""
+        if self._grasp is None:
+            return self.scene.objects[0]
+        position = self._grasp.position[:2]
+        return min(
+            self.scene.objects,
+            key=lambda name: float(np.linalg.norm(self.simulation.object_pose(name)[:2, 3] - position)),
+        )
+
+    def _verdict(self, outcome: Outcome) -> str:
+        return f"{outcome}: {self.driver.reflex}" if outcome is Outcome.REFLEX else str(outcome)
+
+    def _record_execution(self, phase: str, driver: ArmDriver) -> None:
+        if self.simulation.time - self._last_record >= _TICK_PERIOD - 1e-6:
+            self._record(phase, None, None, {})
+
+    def _record(
+        self,
+        phase: str,
+        frame: DepthFrame | None,
+        grasp_map: GraspMap | None,
+        diagnostics: Mapping[str, FloatArray | float | bool],
+    ) -> None:
+        self._last_record = self.simulation.time
+        driver = self.driver
+        self.recorder.tick(
+            TickRecord(
+                phase=phase,
+                simulation=self.simulation,
+                frame=frame,
+                grasp_map=grasp_map,
+                diagnostics=diagnostics,
+                twist_commanded=driver.twist_commanded,
+                twist_achieved=driver.twist_achieved,
+                min_singular_value=driver.min_singular_value,
+                manipulability=driver.manipulability,
+                grasp=self._grasp,
+                event=None if driver.reflex is None else str(driver.reflex),
+            )
+        )
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        clock = time.perf_counter()
+        yield
+        self._times[stage].append(time.perf_counter() - clock)
+
+
+def _judge(execution: ExecutionResult) -> Outcome:
+    return Outcome(execution.outcome)

@@ -1,0 +1,232 @@
+"""A rigid object as a union of convex parts, and how it enters a MuJoCo model.
+
+What a camera sees and what a finger touches are the same parts, so that the true shape, the depth
+image and the contacts can never disagree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull, QhullError
+
+from mpgrasp.exceptions import AssetError
+from mpgrasp.geometry import FloatArray, transform
+
+OBJECT_GROUP = 1
+"""Geom group of all objects: height maps cast their rays at this group alone."""
+MAX_SIZE = 0.3
+"""Largest edge of an object's bounding box [m]; anything above was most likely saved in millimetres."""
+SOLREF = (0.004, 1.0)
+"""Time constant [s] (the least that 2 ms steps allow) and damping ratio of an object's contacts."""
+SOLIMP = (0.99, 0.999, 0.0005, 0.5, 2.0)
+"""Soft contacts give in proportion to force over mass: 40 N on 10 g would sink 3 mm at the usual 0.95."""
+TORSIONAL_FRICTION = 0.003
+"""Moment of friction about the contact normal per unit of normal force [m]: a soft pad's patch."""
+ROLLING_FRICTION = 0.0008
+"""Moment of friction against rolling per unit of normal force [m]: cloth gives way under a round thing."""
+
+_ROUND = ("cylinder", "capsule", "ellipsoid")
+_GEOM_TYPES = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
+}
+_SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "mesh": 0}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """One convex piece: a primitive with its pose in the object's frame, or the hull of vertices."""
+
+    shape: str
+    """box, cylinder, capsule, ellipsoid or mesh."""
+    size: tuple[float, ...] = ()
+    """Half sizes as in MuJoCo [m]: box and ellipsoid (x, y, z); cylinder and capsule (radius, half length)."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m]"""
+    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """wxyz, unit length."""
+    vertices: FloatArray | None = None
+    """(n, 3) [m], of a mesh: the part is their convex hull."""
+
+    def __post_init__(self) -> None:
+        if self.shape not in _GEOM_TYPES:
+            raise AssetError("unknown shape of a part", got=self.shape, allowed=_GEOM_TYPES)
+        size = tuple(float(s) for s in self.size)
+        if len(size) != _SIZES[self.shape] or not all(0 < s < np.inf for s in size):
+            raise AssetError(
+                f"unusable size of a {self.shape}",
+                got=self.size,
+                allowed=f"{_SIZES[self.shape]} positive lengths [m]",
+            )
+        if self.shape == "mesh":
+            vertices = np.asarray(self.vertices if self.vertices is not None else [], float).reshape(-1, 3)
+            if len(vertices) < 4 or not np.isfinite(vertices).all():
+                raise AssetError("mesh is empty", got=f"{len(vertices)} vertices", allowed="at least 4, finite")
+            object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "size", size)
+
+    @property
+    def T_object_part(self) -> FloatArray:
+        """Pose (4, 4) of the part in the object."""
+        return transform(rotation_of(self.quaternion), self.position)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(n, 3) [m] points of the part's surface in the object's frame; their hull fills it to about 2 %."""
+        T = self.T_object_part
+        return self._local_points() @ T[:3, :3].T + T[:3, 3]
+
+    @cached_property
+    def volume(self) -> float:
+        """[m^3]"""
+        s = self.size
+        if self.shape == "box":
+            return 8 * s[0] * s[1] * s[2]
+        if self.shape == "cylinder":
+            return 2 * np.pi * s[0] ** 2 * s[1]
+        if self.shape == "capsule":
+            return np.pi * s[0] ** 2 * (2 * s[1] + 4 / 3 * s[0])
+        if self.shape == "ellipsoid":
+            return 4 / 3 * np.pi * s[0] * s[1] * s[2]
+        try:
+            return float(ConvexHull(self.points).volume)
+        except QhullError:
+            raise AssetError("mesh is flat", got=f"{len(self.points)} vertices in one plane") from None
+
+    def _local_points(self) -> FloatArray:
+        if self.shape == "mesh":
+            assert self.vertices is not None
+            return self.vertices
+        s = self.size
+        if self.shape == "box":
+            return np.array(np.meshgrid(*[(-a, a) for a in s])).reshape(3, -1).T
+        if self.shape == "cylinder":
+            a = np.arange(24) * np.pi / 12
+            ring = np.column_stack([np.cos(a), np.sin(a)]) * s[0]
+            return np.vstack([np.column_stack([ring, np.full(24, z)]) for z in (-s[1], s[1])])
+        if self.shape == "capsule":
+            ball = _SPHERE * s[0]
+            return np.vstack([ball + (0, 0, s[1]), ball - (0, 0, s[1])])
+        return _SPHERE * s
+
+
+def _sphere_points(n: int = 162) -> FloatArray:
+    """Points (n + 6, 3) on the unit sphere: a Fibonacci spiral and the six poles of the axes."""
+    k = np.arange(n)
+    z = 1 - (2 * k + 1) / n
+    a = k * np.pi * (3 - np.sqrt(5))
+    r = np.sqrt(1 - z**2)
+    points = np.column_stack([r * np.cos(a), r * np.sin(a), z])
+    return np.vstack([points, np.eye(3), -np.eye(3)])
+
+
+_SPHERE = _sphere_points()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ObjectModel:
+    """A rigid object. Its frame has z up in the pose in which the object is meant to stand or lie."""
+
+    name: str
+    parts: tuple[Part, ...]
+    mass: float
+    """[kg]"""
+    friction: float = 0.6
+    """Sliding friction coefficient against everything: cloth, pads (an object's contacts are its own)."""
+    rgba: tuple[float, float, float, float] = (0.75, 0.75, 0.75, 1.0)
+    rolls: bool = False
+    """Give all parts friction against rolling; parts that are cylinders, capsules or ellipsoids always have it."""
+    provenance: str = ""
+    """Where shape and mass come from."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(self.parts))
+        if not self.name or "/" in self.name:
+            raise AssetError("unusable name of an object", got=self.name, allowed="non-empty, without '/'")
+        if not self.parts:
+            raise AssetError(f"object {self.name} is empty", got="no parts", allowed="at least one part")
+        if not 0 < self.mass < np.inf:
+            raise AssetError(f"unusable mass of object {self.name} [kg]", got=self.mass, allowed="above 0")
+        if not 0 < self.friction < np.inf:
+            raise AssetError(f"unusable friction of object {self.name}", got=self.friction, allowed="above 0")
+        if max(self.size) > MAX_SIZE:
+            raise AssetError(
+                f"object {self.name} is too large [m]",
+                got=round(float(max(self.size)), 4),
+                allowed=f"edges up to {MAX_SIZE} m; is it saved in millimetres?",
+            )
+        if self.volume <= 0:
+            raise AssetError(f"object {self.name} has no volume", got=self.volume)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(n, 3) [m] points of the parts' surfaces, in the object's frame."""
+        return np.vstack([part.points for part in self.parts])
+
+    @cached_property
+    def size(self) -> tuple[float, float, float]:
+        """Edges of the bounding box (x, y, z) [m]."""
+        x, y, z = np.ptp(self.points, axis=0)
+        return float(x), float(y), float(z)
+
+    @cached_property
+    def volume(self) -> float:
+        """Sum over the parts [m^3]; overlaps count twice."""
+        return sum(part.volume for part in self.parts)
+
+
+def rotation_of(quaternion: ArrayLike) -> FloatArray:
+    """Rotation (3, 3) of a wxyz quaternion."""
+    R = np.empty(9)
+    mujoco.mju_quat2Mat(R, np.asarray(quaternion, float))
+    return R.reshape(3, 3)
+
+
+def add_object(
+    spec: mujoco.MjSpec,
+    model: ObjectModel,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    *,
+    name: str | None = None,
+) -> mujoco.MjsBody:
+    """Add the object to a model being built, as a free body called `name` (default: its own name).
+
+    The contacts of its geoms are the object's own (priority 1), whatever it touches.
+    """
+    name = name or model.name
+    body = spec.worldbody.add_body(name=name, pos=position, quat=quaternion)
+    body.add_freejoint(name=f"{name}/free")
+    for k, part in enumerate(model.parts):
+        rolls = model.rolls or part.shape in _ROUND
+        geom = body.add_geom(
+            name=f"{name}/{k}",
+            type=_GEOM_TYPES[part.shape],
+            pos=part.position,
+            quat=part.quaternion,
+            mass=model.mass * part.volume / model.volume,
+            friction=[model.friction, TORSIONAL_FRICTION, ROLLING_FRICTION],
+            condim=6 if rolls else 4,
+            priority=1,
+            solref=list(SOLREF),
+            solimp=list(SOLIMP),
+            group=OBJECT_GROUP,
+            rgba=list(model.rgba),
+        )
+        if part.shape == "mesh":
+            assert part.vertices is not None
+            spec.add_mesh(
+                name=f"{name}/{k}", uservert=part.vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+            )
+            geom.meshname = f"{name}/{k}"
+        else:
+            geom.size[: len(part.size)] = part.size
+    return body

@@ -1,0 +1,162 @@
+"""The Franka Emika Robot (FER, "Panda") with hand and wrist camera: model, limits and poses.
+
+References: limits from https://frankaemika.github.io/docs/control_parameters.html (limits for Panda); those in current
+libfranka are the FR3's and differ. Frames and inertials from franka_description, by way of example-robot-data.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from mpgrasp.exceptions import AssetError, ConfigError
+from mpgrasp.geometry import FloatArray
+from mpgrasp.paths import PANDA_ASSETS
+
+PREFIX = "panda/"
+"""Where the robot is attached to a world, its elements carry this prefix."""
+ROBOT_GROUP = 2
+"""Geom group of everything that belongs to the robot, and of nothing else."""
+
+ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
+FINGER_JOINTS = ("finger_joint1", "finger_joint2")
+
+
+def _constant(*values: float) -> FloatArray:
+    array = np.array(values)
+    array.flags.writeable = False
+    return array
+
+
+Q_HOME = _constant(0, -np.pi / 4, 0, -3 * np.pi / 4, 0, np.pi / 2, np.pi / 4)
+"""(7,) [rad]: tool down, camera on the side away from the base."""
+Q_MIN = _constant(-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
+"""(7,) [rad]"""
+Q_MAX = _constant(2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)
+"""(7,) [rad]"""
+DQ_MAX = _constant(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)
+"""(7,) [rad/s]"""
+DDQ_MAX = _constant(15, 7.5, 10, 12.5, 15, 20, 20)
+"""(7,) [rad/s2]"""
+TORQUE_MAX = _constant(87, 87, 87, 87, 12, 12, 12)
+"""(7,) [N m]"""
+CARTESIAN_SPEED_MAX = 1.7
+"""Translation of the tool [m/s]."""
+CARTESIAN_ACCELERATION_MAX = 13.0
+"""Translation of the tool [m/s2]."""
+
+TCP_OFFSET = 0.1034
+"""From the hand frame to the tool point, along the approach axis [m]."""
+FINGERTIP_BEYOND_TCP = 0.0087
+"""From the tool point to the finger tips, along the approach axis [m]."""
+FINGER_WIDTH = 0.0176
+"""Width of a finger tip across the closing direction [m]."""
+FINGER_THICKNESS = 0.0144
+"""Thickness of a finger tip along the closing direction [m]."""
+PAD_HEIGHT = 0.0178
+"""Height of the straight part of a finger tip, up from its end [m]."""
+GRIPPER_MAX_WIDTH = 0.08
+"""Opening between the pads [m]."""
+GRIPPER_SPEED = 0.1
+"""Speed at which the opening follows a commanded width: 0.05 m/s for each finger [m/s]."""
+GRIPPER_CLOSE_SPEED = 0.05
+"""Speed at which the opening shrinks while grasping [m/s]."""
+GRIPPER_FORCE_MIN = 30.0
+"""Smallest continuous force of each pad [N]."""
+GRIPPER_FORCE_MAX = 70.0
+"""Largest continuous force of each pad [N]."""
+GRIPPER_FORCE_DEFAULT = 40.0
+"""Force of each pad unless told otherwise [N]."""
+
+_DESCRIPTION = Path("share/example-robot-data/robots/panda_description/meshes/collision")
+
+
+@cache
+def mesh_directory() -> Path:
+    """Folder of the arm's collision meshes in the installed package example-robot-data.
+
+    Raises:
+        AssetError: the package is not installed.
+    """
+    # The wheel keeps its data under cmeel.prefix beside the packages and has nothing to import.
+    for entry in sys.path:
+        candidate = Path(entry) / "cmeel.prefix" / _DESCRIPTION
+        if (candidate / "link0.stl").is_file():
+            return candidate.resolve()
+    raise AssetError(
+        "the Panda's meshes are not installed",
+        got=f"no cmeel.prefix/{_DESCRIPTION} on sys.path",
+        allowed="pip install example-robot-data",
+    )
+
+
+def panda_spec() -> mujoco.MjSpec:
+    """A fresh, unprefixed model of the arm with hand and camera, base frame at the origin.
+
+    Attach it with the prefix `panda/`. Mesh paths in it are absolute, so that a saved world opens in
+    the plain viewer on the same computer.
+
+    Raises:
+        AssetError: the meshes or the model file are missing.
+    """
+    path = PANDA_ASSETS / "panda.xml"
+    if not path.is_file():
+        raise AssetError("the Panda's model is missing", got=str(path), allowed="a complete installation")
+    spec = mujoco.MjSpec.from_file(str(path))
+    directory = mesh_directory()
+    for mesh in spec.meshes:
+        mesh.file = str(directory / mesh.file)
+    return spec
+
+
+def set_home(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Put the attached robot into its home pose with open gripper, at rest, targets included."""
+    for name, value in zip(ARM_JOINTS, Q_HOME, strict=True):
+        joint = model.joint(PREFIX + name)
+        data.qpos[joint.qposadr] = value
+        data.qvel[joint.dofadr] = 0.0
+        data.ctrl[model.actuator(PREFIX + name).id] = value
+    for name in FINGER_JOINTS:
+        joint = model.joint(PREFIX + name)
+        data.qpos[joint.qposadr] = GRIPPER_MAX_WIDTH / 2
+        data.qvel[joint.dofadr] = 0.0
+    data.ctrl[model.actuator(PREFIX + "gripper").id] = GRIPPER_MAX_WIDTH
+
+
+def arm_model() -> mujoco.MjModel:
+    """Kinematic model for IK: seven joints, fingers fixed open, and the table as a plane at z = 0.
+
+    Names carry no prefix (`joint1`, `tcp`, `hand`, ...); the plane is called `table`.
+    """
+    spec = panda_spec()
+    spec.modelname = "panda_arm"
+    for element in (*spec.keys, *spec.tendons, *spec.equalities, *spec.actuators):
+        spec.delete(element)
+    for name, joint, side in zip(("left_finger", "right_finger"), FINGER_JOINTS, (1, -1), strict=True):
+        finger = spec.body(name)
+        finger.pos = finger.pos + [0.0, side * GRIPPER_MAX_WIDTH / 2, 0.0]
+        spec.delete(spec.joint(joint))
+    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.01])
+    return spec.compile()
+
+
+def collision_pairs(model: mujoco.MjModel) -> list[tuple[list[str], list[str]]]:
+    """Groups of geoms of an `arm_model()` that must keep apart, as mink's collision limit takes them.
+
+    The fingers may come close to the table, where grasps happen; the hand and the camera may not.
+
+    Raises:
+        ConfigError: a model with other names.
+    """
+    tool, fingers = ["hand", "camera_housing"], ["left_pad", "right_pad"]
+    pairs = [(tool, ["table"]), ([*tool, *fingers], ["link0", "link1", "link2"]), (["camera_housing"], ["link5"])]
+    missing = {name for pair in pairs for group in pair for name in group} - {
+        model.geom(i).name for i in range(model.ngeom)
+    }
+    if missing:
+        raise ConfigError("not an arm model", got=f"no geoms {sorted(missing)}", allowed="panda.arm_model()")
+    return pairs

@@ -1,0 +1,184 @@
+"""Depth and colour images through OpenGL, off screen, at exact pinhole intrinsics.
+
+MuJoCo's own `Renderer` takes its frustum from the model; here it comes from `CameraIntrinsics`, so that any
+window of an image is drawn alone, with the very pixels it would have in the whole. Multisampling is off for
+depth: a resolved depth sample does not lie at the pixel's centre.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import platform
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp.depth import CameraIntrinsics
+from mpgrasp.exceptions import CameraError
+from mpgrasp.geometry import FloatArray
+
+NEAR = 0.02
+"""Whatever is nearer than this z-depth is not seen [m]."""
+FAR = 5.0
+"""Whatever is farther than this z-depth is not seen [m]."""
+
+_MAX_GEOMS = 10_000
+_CATEGORIES = mujoco.mjtCatBit.mjCAT_STATIC.value | mujoco.mjtCatBit.mjCAT_DYNAMIC.value
+_SHADOW_MAP = 1024
+_COLOUR_SAMPLES = 4
+_SLICES = 64
+
+
+@functools.cache
+def gl_context() -> Any:
+    """The process's one off-screen GL context; EGL on Linux unless `MUJOCO_GL` asks for another.
+
+    Start worker processes with "spawn": a context does not survive a fork.
+
+    Raises:
+        CameraError: there is no GL on this machine.
+    """
+    try:
+        if platform.system() == "Linux" and not os.environ.get("MUJOCO_GL"):
+            # mujoco picks glfw by itself, which needs a display
+            from mujoco.egl import GLContext
+        else:
+            from mujoco import GLContext
+        context = GLContext(64, 64)
+        context.make_current()
+    except Exception as error:  # each platform's binding raises types of its own
+        raise CameraError(
+            f"OpenGL cannot be initialised: {type(error).__name__}: {error}",
+            allowed='a machine with EGL (libegl1 and a driver such as Mesa), or backend="ray", which needs no GL',
+        ) from error
+    return context
+
+
+@contextlib.contextmanager
+def _visual_settings(model: mujoco.MjModel, width: int, height: int, colour: bool) -> Iterator[None]:
+    """Have the model ask for a buffer of our size while a context is made from it, then restore it."""
+    glob, quality = model.vis.global_, model.vis.quality
+    kept = (
+        glob.offwidth,
+        glob.offheight,
+        quality.offsamples,
+        quality.shadowsize,
+        quality.numslices,
+        quality.numstacks,
+    )
+    glob.offwidth, glob.offheight = width, height
+    quality.offsamples = _COLOUR_SAMPLES if colour else 0
+    quality.shadowsize = _SHADOW_MAP if colour else 0
+    quality.numslices, quality.numstacks = _SLICES, _SLICES
+    try:
+        yield
+    finally:
+        (
+            glob.offwidth,
+            glob.offheight,
+            quality.offsamples,
+            quality.shadowsize,
+            quality.numslices,
+            quality.numstacks,
+        ) = kept
+
+
+class Rasteriser:
+    """Draws one model into images of one size.
+
+    Args:
+        model: the world to draw.
+        intrinsics: geometry of the image.
+        colour: draw colour (multisampled, with shadows) instead of depth.
+        geom_groups: the geom groups that are seen.
+
+    Raises:
+        CameraError: there is no GL on this machine.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        intrinsics: CameraIntrinsics,
+        *,
+        colour: bool = False,
+        geom_groups: tuple[int, ...] = (0, 1, 2),
+    ) -> None:
+        self._model = model
+        self._intrinsics = intrinsics
+        self._colour = colour
+        gl_context().make_current()
+        with _visual_settings(model, intrinsics.width, intrinsics.height, colour):
+            self._context: mujoco.MjrContext | None = mujoco.MjrContext(
+                model, mujoco.mjtFontScale.mjFONTSCALE_50.value
+            )
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._scene = mujoco.MjvScene(model, maxgeom=_MAX_GEOMS)
+        self._rect = mujoco.MjrRect(0, 0, intrinsics.width, intrinsics.height)
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = [group in geom_groups for group in range(mujoco.mjNGROUP)]
+        for decoration in ("sitegroup", "jointgroup", "tendongroup", "actuatorgroup"):
+            getattr(self._option, decoration)[:] = 0
+        self._free_camera = mujoco.MjvCamera()
+        if not colour:
+            flags = self._scene.flags
+            flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
+            flags[mujoco.mjtRndFlag.mjRND_SHADOW] = flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+
+    def render(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[Any]:
+        """The image seen from an OpenCV camera at `T_world_camera` (4, 4).
+
+        Returns:
+            (H, W) float32 z-depth [m], NaN where nothing is seen; or (H, W, 3) uint8 colour.
+        """
+        if self._context is None:
+            raise CameraError("the camera was closed", allowed="a new camera")
+        gl_context().make_current()
+        mujoco.mjv_updateScene(
+            self._model, data, self._option, None, self._free_camera, _CATEGORIES, self._scene
+        )
+        for eye in self._scene.camera:
+            self._place(eye, T_world_camera)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        shape = (self._intrinsics.height, self._intrinsics.width)
+        if self._colour:
+            rgb = np.empty((*shape, 3), np.uint8)
+            mujoco.mjr_readPixels(rgb, None, self._rect, self._context)
+            return np.ascontiguousarray(rgb[::-1])
+        buffer = np.empty(shape, np.float32)
+        mujoco.mjr_readPixels(None, buffer, self._rect, self._context)
+        return _z_depth(buffer[::-1])
+
+    def _place(self, eye: Any, T_world_camera: FloatArray) -> None:
+        """Give one of MuJoCo's two (stereo) eyes our pose and frustum."""
+        i = self._intrinsics
+        eye.pos, eye.forward, eye.up = T_world_camera[:3, 3], T_world_camera[:3, 2], -T_world_camera[:3, 1]
+        # integers are pixel centres, so the image ends half a pixel outside of the first and last
+        eye.frustum_top, eye.frustum_bottom = (
+            NEAR * (i.cy + 0.5) / i.fy,
+            NEAR * (i.cy + 0.5 - i.height) / i.fy,
+        )
+        eye.frustum_center = NEAR * (i.width / 2 - 0.5 - i.cx) / i.fx
+        eye.frustum_width = NEAR * (i.width / 2) / i.fx  # MuJoCo's name for half of it
+        eye.frustum_near, eye.frustum_far = NEAR, FAR
+        eye.orthographic = 0
+
+    def close(self) -> None:
+        """Free the GL resources; the object is of no use afterwards."""
+        context, self._context = self._context, None
+        if context is not None:
+            gl_context().make_current()
+            context.free()
+
+
+def _z_depth(buffer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Z-depth [m] of a reversed depth buffer (1 at NEAR, 0 at FAR), NaN where the buffer is empty."""
+    z = np.float32(NEAR * FAR) / (buffer * np.float32(FAR - NEAR) + np.float32(NEAR))
+    z[buffer <= 0] = np.nan
+    return z

@@ -1,0 +1,159 @@
+"""What a stereo depth camera makes of the true depth image: noise, steps, shadows, holes.
+
+The model is that of an Intel RealSense D435, whose depth is f B / disparity with the disparity matched between
+two imagers a baseline apart (Keselman et al. 2017, "Intel RealSense stereoscopic depth cameras"; Intel, "Best known
+methods for tuning RealSense D400 depth cameras", 2018-2020). Lengths in pixels are the sensor's, at its own
+focal length, and are scaled to whatever image is at hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp.depth import CameraIntrinsics
+from mpgrasp.exceptions import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthNoise:
+    """Figures of the sensor; the defaults are a D435's."""
+
+    baseline: float = 0.050
+    """Distance between the imagers [m]; D400 series datasheet."""
+    focal_px: float = 447.0
+    """Focal length at which disparities are matched [px]; D435 at 848 x 480."""
+    subpixel: float = 0.08
+    """Standard deviation of the disparity [px]; Intel's tuning guide gives 0.05 to 0.1 for textured targets."""
+    correlation_px: float = 2.0
+    """Standard deviation of the Gaussian that correlates neighbouring disparities [px]; matching windows overlap."""
+    disparity_step: float = 1 / 32
+    """Quantum of the reported disparity [px]; the D4 chip matches to five fractional bits."""
+    min_z: float = 0.18
+    """Nearest depth that is reported [m]; datasheet, about 0.18 at 848 x 480."""
+    shadows: bool = True
+    """Whether background that the right imager cannot see is missing."""
+    max_incidence: float = float(np.deg2rad(82.0))
+    """Surfaces seen at a larger angle from their normal are missing [rad]; there, a matching window 5 px wide spans
+    more than one pixel of disparity at half a metre."""
+    multiplicative: float = 0.0
+    """Stress mode, not a D435: standard deviation of white noise that multiplies the depth [-]."""
+
+    def __post_init__(self) -> None:
+        for name in ("baseline", "focal_px"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} of the depth sensor", got=getattr(self, name), allowed="above 0")
+        for name in ("subpixel", "correlation_px", "disparity_step", "min_z", "multiplicative"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} of the depth sensor", got=getattr(self, name), allowed="0 or more")
+        if not 0 < self.max_incidence <= np.pi / 2:
+            raise ConfigError("max_incidence", got=self.max_incidence, allowed="above 0, up to pi/2 [rad]")
+
+    def sigma(self, z: float) -> float:
+        """Standard deviation [m] of the depth at z [m], before quantisation."""
+        return z * z * self.subpixel / (self.focal_px * self.baseline)
+
+    def shadow_px(self, z_near: float, z_far: float, focal_px: float) -> float:
+        """Width of the shadow [px] that an edge at z_near [m] casts on z_far [m] in an image of `focal_px`."""
+        return focal_px * self.baseline * (1 / z_near - 1 / z_far)
+
+    def margin_px(self, intrinsics: CameraIntrinsics) -> int:
+        """Columns right of a window that can decide over shadows in it [px], for edges 0.15 m over 0.5 m."""
+        return int(np.ceil(self.shadow_px(0.35, 0.5, intrinsics.fx))) if self.shadows else 0
+
+
+def apply(
+    depth: NDArray[np.float32],
+    intrinsics: CameraIntrinsics,
+    rng: np.random.Generator,
+    noise: DepthNoise,
+) -> NDArray[np.float32]:
+    """What the sensor reports for a true depth image.
+
+    The generator advances by the image's size alone, never by its content.
+
+    Args:
+        depth: (H, W) true z-depth [m], NaN = no return.
+        intrinsics: geometry of that image.
+        rng: source of the noise.
+        noise: the sensor.
+
+    Returns:
+        (H, W) z-depth [m], a new array.
+    """
+    scale = intrinsics.fx / noise.focal_px
+    fb = np.float32(noise.focal_px * noise.baseline)
+    disparity = fb / depth
+    error = _correlated_noise(depth.shape, noise.correlation_px * scale, rng)
+    error *= np.float32(noise.subpixel)
+    error += disparity
+    if noise.disparity_step > 0:
+        error *= np.float32(1 / noise.disparity_step)
+        np.rint(error, out=error)
+        error *= np.float32(noise.disparity_step)
+    with np.errstate(divide="ignore"):
+        measured = np.divide(fb, error, out=error)
+    if noise.multiplicative > 0:
+        white = rng.standard_normal(depth.shape, dtype=np.float32)
+        measured *= 1 + np.float32(noise.multiplicative) * white
+    lost = ~((measured >= noise.min_z) & np.isfinite(measured))
+    if noise.shadows:
+        lost |= _shadows(disparity * np.float32(scale))
+    if noise.max_incidence < np.pi / 2:
+        lost |= _grazing(depth, intrinsics, noise.max_incidence)
+    measured[lost] = np.nan
+    return measured
+
+
+def _correlated_noise(
+    shape: tuple[int, ...], blur_px: float, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """White noise (H, W) blurred by a Gaussian of `blur_px`, scaled back to unit variance."""
+    white = rng.standard_normal(shape, dtype=np.float32)
+    radius = int(np.ceil(3 * blur_px))
+    if radius == 0 or blur_px < 0.3:
+        return white
+    kernel = cv2.getGaussianKernel(2 * radius + 1, blur_px, cv2.CV_32F)
+    kernel /= np.linalg.norm(kernel)  # of a separable filter's output, the variance is the product of both norms^2
+    # wrapping round keeps the variance even at the border, where reflecting would double it
+    padded = np.pad(white, radius, mode="wrap")
+    blurred = cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel)
+    return np.ascontiguousarray(blurred[radius:-radius, radius:-radius])
+
+
+def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Pixels (H, W) that the right imager cannot see, from disparities in pixels of this image.
+
+    The depth image is the left imager's. A point of column u falls on column u - disparity of the right one and
+    is hidden there if something further right in the left image, hence nearer, falls on the same or a lower column.
+    """
+    column = np.arange(disparity.shape[1], dtype=np.float32)
+    right = column - disparity
+    right[np.isnan(right)] = np.inf
+    nearest = np.minimum.accumulate(right[:, ::-1], axis=1)[:, ::-1]
+    hidden = np.zeros(disparity.shape, bool)
+    # neighbours on one flat surface are a whole pixel apart: half of that rounds the band's width
+    np.less(nearest[:, 1:], right[:, :-1] + np.float32(0.5), out=hidden[:, :-1])
+    hidden[np.isinf(right)] = False
+    return hidden
+
+
+def _grazing(
+    depth: NDArray[np.float32], intrinsics: CameraIntrinsics, max_incidence: float
+) -> NDArray[np.bool_]:
+    """Pixels (H, W) of surfaces whose slope against the image plane is beyond `max_incidence` [rad].
+
+    A slope counts only where it goes on to both sides of a pixel, so that the rim of a flat object is kept.
+    """
+    bound = np.float32(np.tan(max_incidence))
+    grazing = np.zeros(depth.shape, bool)
+    for axis, focal in ((1, intrinsics.fx), (0, intrinsics.fy)):
+        step = np.abs(np.diff(depth, axis=axis))
+        middle = depth[:, 1:-1] if axis == 1 else depth[1:-1]
+        first, second = (step[:, :-1], step[:, 1:]) if axis == 1 else (step[:-1], step[1:])
+        steep = np.fmin(first, second) > middle * np.float32(bound / focal)
+        (grazing[:, 1:-1] if axis == 1 else grazing[1:-1])[...] |= steep
+    return grazing

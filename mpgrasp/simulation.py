@@ -1,0 +1,318 @@
+"""The running world: time, motion targets, contacts and state of one scene.
+
+Between two calls everything in `data` belongs to the same instant: `step` ends with a forward pass, because MuJoCo's own
+step leaves poses and contacts one time step behind the joint positions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from mpgrasp import panda
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, transform
+
+if TYPE_CHECKING:
+    from mpgrasp.scene import Scene
+
+SERVO_PERIOD = 0.01
+"""Time in which the arm's reference runs up to a commanded position, the period of the velocity loop [s]."""
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_ELSEWHERE = -1
+_ROBOT = -2
+_PAD_FACE_COSINE = 0.5
+"""A pad is touched by its face if the contact normal is within 60 degrees of the closing direction: wider than any
+friction cone here, and blind to what a tip stands on."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Snapshot:
+    """Everything that decides the future of a simulation."""
+
+    state: FloatArray
+    """MuJoCo's integration state."""
+    q_target: FloatArray
+    """(7,) [rad]"""
+    dq_target: FloatArray
+    """(7,) [rad/s]"""
+    ramp_steps: int
+    """Steps until the reference arrives at `q_target`."""
+    grip_force: float | None
+    """Force of each pad while grasping [N]; None while the gripper holds a width."""
+    width_target: float
+    """Commanded opening [m]."""
+
+
+class Simulation:
+    """One scene in motion.
+
+    Args:
+        scene: a built scene with the robot attached under the prefix `panda/`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.model: mujoco.MjModel = scene.model
+        self.data = mujoco.MjData(self.model)
+        self._index_robot()
+        self._index_owners()
+        self.reset()
+
+    # ---- time -------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.data.time)
+
+    def reset(self) -> None:
+        """Back to the settled scene, arm at home and at rest, gripper open."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, self.scene.state, _STATE)
+        panda.set_home(self.model, self.data)
+        self._grip_force: float | None = None
+        self._width_target = panda.GRIPPER_MAX_WIDTH
+        self.set_q(panda.Q_HOME)
+
+    def step(self, n: int = 1) -> None:
+        """Advance by n time steps."""
+        for _ in range(n):
+            self._drive_arm()
+            self._drive_gripper()
+            mujoco.mj_step(self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
+
+    # ---- arm --------------------------------------------------------------------------------------------------
+
+    @property
+    def q(self) -> FloatArray:
+        """Joint positions (7,) [rad]."""
+        return self.data.qpos[self._qpos].copy()
+
+    @property
+    def dq(self) -> FloatArray:
+        """Joint velocities (7,) [rad/s]."""
+        return self.data.qvel[self._dofs].copy()
+
+    @property
+    def torque(self) -> FloatArray:
+        """Torques (7,) [N m] that the drives exert, gravity compensation included."""
+        return self.data.qfrc_actuator[self._dofs].copy()
+
+    @property
+    def T_world_tcp(self) -> FloatArray:
+        """Pose (4, 4) of the tool point."""
+        return transform(
+            self.data.site_xmat[self._tcp].reshape(3, 3), self.data.site_xpos[self._tcp]
+        )
+
+    @property
+    def twist_tcp(self) -> FloatArray:
+        """Velocity (6,) of the tool point, linear then angular, world axes [m/s, rad/s]."""
+        angular_linear = np.empty(6)
+        mujoco.mj_objectVelocity(
+            self.model, self.data, mujoco.mjtObj.mjOBJ_SITE, self._tcp, angular_linear, 0
+        )
+        return np.concatenate([angular_linear[3:], angular_linear[:3]])
+
+    def set_q(self, q: FloatArray) -> None:
+        """Teleport the arm to q (7,) [rad] at rest and hold it there; for the start of an episode only."""
+        self.data.qpos[self._qpos] = q
+        self.data.qvel[self._dofs] = 0.0
+        self._q_target = np.array(q, float)
+        self._dq_target = np.zeros(7)
+        self._ramp_steps = 0
+        mujoco.mj_forward(self.model, self.data)
+
+    def set_arm_target(self, q: FloatArray, dq: FloatArray) -> None:
+        """Be at q (7,) [rad] one `SERVO_PERIOD` from now, moving with dq (7,) [rad/s].
+
+        The servo's reference runs up to q at the rate dq and waits there, so calls once per period with
+        `q += dq * SERVO_PERIOD` give a seamless motion, and a caller that falls silent stops the arm.
+        Positions are cut at the joint limits.
+        """
+        self._q_target = np.clip(q, panda.Q_MIN, panda.Q_MAX)
+        self._dq_target = np.array(dq, float)
+        self._ramp_steps = round(SERVO_PERIOD / self.model.opt.timestep)
+
+    def _drive_arm(self) -> None:
+        if self._ramp_steps == 0:
+            self.data.ctrl[self._arm_actuators] = self._q_target
+            return
+        self._ramp_steps -= 1
+        lead = self._ramp_steps * self.model.opt.timestep
+        # The servo damps against standstill; the second term makes it damp against dq instead.
+        reference = self._q_target + self._dq_target * (self._servo_lead - lead)
+        self.data.ctrl[self._arm_actuators] = reference
+
+    # ---- gripper ----------------------------------------------------------------------------------------------
+
+    @property
+    def gripper_width(self) -> float:
+        """Opening between the pads [m]."""
+        return float(self.data.qpos[self._fingers].sum())
+
+    def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
+        """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at what the hand can do."""
+        self._grip_force = None
+        self._width_target = float(np.clip(width, 0.0, panda.GRIPPER_MAX_WIDTH))
+
+    def close_gripper(self, force: float = panda.GRIPPER_FORCE_DEFAULT) -> None:
+        """Close at `panda.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
+
+        Raises:
+            ConfigError: a force that the hand cannot hold continuously.
+        """
+        if not panda.GRIPPER_FORCE_MIN <= force <= panda.GRIPPER_FORCE_MAX:
+            raise ConfigError(
+                "grip force out of range",
+                got=force,
+                allowed=f"{panda.GRIPPER_FORCE_MIN} to {panda.GRIPPER_FORCE_MAX} N",
+            )
+        self._grip_force = float(force)
+
+    def _drive_gripper(self) -> None:
+        reference = self.data.ctrl[self._gripper]
+        dt = self.model.opt.timestep
+        if self._grip_force is None:
+            change = self._width_target - reference
+            limit = panda.GRIPPER_SPEED * dt
+            self.data.ctrl[self._gripper] = reference + min(max(change, -limit), limit)
+        else:
+            # The servo pulls with its stiffness times the lag: never let it lag by more than the force asked for.
+            floor = self.gripper_width - self._grip_force / self._gripper_stiffness
+            self.data.ctrl[self._gripper] = max(reference - panda.GRIPPER_CLOSE_SPEED * dt, floor)
+
+    # ---- contacts and objects ---------------------------------------------------------------------------------
+
+    def pad_contacts(self) -> tuple[set[str], set[str]]:
+        """Names of the objects that press against the face of the left and of the right pad."""
+        left: set[str] = set()
+        right: set[str] = set()
+        geom = self.data.contact.geom  # (ncon, 2)
+        if not len(geom):
+            return left, right
+        pads, owners = self._pad_side[geom], self._owner[geom]  # (ncon, 2) each
+        for i in np.flatnonzero(pads.any(axis=1) & (owners >= 0).any(axis=1)):
+            closing = self.data.site_xmat[self._tcp].reshape(3, 3)[:, 1]
+            if abs(self.data.contact.frame[i, :3] @ closing) < _PAD_FACE_COSINE or not self._normal_force(i):
+                continue
+            side = left if pads[i].max() == 1 else right
+            side.add(self.scene.objects[owners[i].max()])
+        return left, right
+
+    def contact_force(self) -> float:
+        """Largest normal force [N] of one part of the robot against one thing that is not the robot."""
+        return self._largest_force(self._owner == _ROBOT)
+
+    def finger_contact_force(self) -> float:
+        """The same for the hand, the camera and the fingers only [N]."""
+        return self._largest_force(self._is_hand)
+
+    def object_pose(self, name: str) -> FloatArray:
+        """Pose (4, 4) of an object's body frame in the world.
+
+        Raises:
+            ConfigError: the scene has no such object.
+        """
+        if name not in self.scene.objects:
+            raise ConfigError("unknown object", got=name, allowed=self.scene.objects)
+        body = self.data.body(name)
+        return transform(body.xmat.reshape(3, 3), body.xpos)
+
+    def _largest_force(self, part: np.ndarray) -> float:
+        geom = self.data.contact.geom
+        if not len(geom):
+            return 0.0
+        robot = self._owner[geom] == _ROBOT
+        relevant = np.flatnonzero(part[geom].any(axis=1) & (robot.sum(axis=1) == 1))
+        # Several contact points between two geoms share the load.
+        sums: dict[tuple[int, int], float] = {}
+        for i in relevant:
+            pair = (int(geom[i, 0]), int(geom[i, 1]))
+            sums[pair] = sums.get(pair, 0.0) + self._normal_force(i)
+        return max(sums.values(), default=0.0)
+
+    def _normal_force(self, contact: int) -> float:
+        mujoco.mj_contactForce(self.model, self.data, contact, self._wrench)
+        return float(self._wrench[0])
+
+    # ---- state ------------------------------------------------------------------------------------------------
+
+    def state_hash(self) -> str:
+        """SHA-256 (hex) of the integration state."""
+        return hashlib.sha256(self._state().tobytes()).hexdigest()
+
+    def save(self) -> Snapshot:
+        """Everything needed to come back to this instant."""
+        return Snapshot(
+            state=self._state(),
+            q_target=self._q_target.copy(),
+            dq_target=self._dq_target.copy(),
+            ramp_steps=self._ramp_steps,
+            grip_force=self._grip_force,
+            width_target=self._width_target,
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Come back to a saved instant; what follows is the same to the last bit."""
+        mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
+        self._q_target = snapshot.q_target.copy()
+        self._dq_target = snapshot.dq_target.copy()
+        self._ramp_steps = snapshot.ramp_steps
+        self._grip_force = snapshot.grip_force
+        self._width_target = snapshot.width_target
+        mujoco.mj_forward(self.model, self.data)
+
+    def _state(self) -> FloatArray:
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return state
+
+    # ---- indices ----------------------------------------------------------------------------------------------
+
+    def _index_robot(self) -> None:
+        model, prefix = self.model, panda.PREFIX
+        try:
+            joints = [model.joint(prefix + name) for name in panda.ARM_JOINTS]
+            self._fingers = np.array([model.joint(prefix + n).qposadr[0] for n in panda.FINGER_JOINTS])
+            self._arm_actuators = np.array([model.actuator(prefix + n).id for n in panda.ARM_JOINTS])
+            self._gripper = model.actuator(prefix + "gripper").id
+            self._tcp = model.site(prefix + "tcp").id
+        except KeyError as error:
+            raise ConfigError(
+                "the scene has no robot", got=str(error), allowed="build_scene(..., robot=True)"
+            ) from error
+        self._qpos = np.array([joint.qposadr[0] for joint in joints])
+        self._dofs = np.array([joint.dofadr[0] for joint in joints])
+        self._gripper_stiffness = float(model.actuator_gainprm[self._gripper, 0])
+        stiffness = model.actuator_gainprm[self._arm_actuators, 0]
+        self._servo_lead = -model.actuator_biasprm[self._arm_actuators, 2] / stiffness  # kv / kp [s]
+        self._wrench = np.zeros(6)
+
+    def _index_owners(self) -> None:
+        """Precompute for each geom whom it belongs to: an object's index, the robot, or elsewhere."""
+        model = self.model
+        body_owner = np.full(model.nbody, _ELSEWHERE)
+        body_is_hand = np.zeros(model.nbody, bool)
+        objects = {model.body(name).id: index for index, name in enumerate(self.scene.objects)}
+        hand = model.body(panda.PREFIX + "hand").id
+        for body in range(1, model.nbody):  # parents come before children
+            parent = model.body_parentid[body]
+            if body in objects:
+                body_owner[body] = objects[body]
+            elif model.body(body).name.startswith(panda.PREFIX):
+                body_owner[body] = _ROBOT
+            else:
+                body_owner[body] = body_owner[parent]
+            body_is_hand[body] = body == hand or body_is_hand[parent]
+        self._owner = body_owner[model.geom_bodyid]
+        self._is_hand = body_is_hand[model.geom_bodyid]
+        self._pad_side = np.zeros(model.ngeom, int)  # 1 left, 2 right
+        self._pad_side[model.geom(panda.PREFIX + "left_pad").id] = 1
+        self._pad_side[model.geom(panda.PREFIX + "right_pad").id] = 2

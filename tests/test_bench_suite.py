@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from mpgrasp.bench.suite import Suite, episode_seed, load_suite, parse_suite, suite_names
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.objects import load_object
+
+MINIMAL = {"title": "t", "scene": {"objects": ["usb_stick"]}}
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_every_shipped_suite_loads_and_names_objects_that_exist(name: str) -> None:
+    suite = load_suite(name)
+    assert suite.name == name
+    for scene in suite.scenes:
+        for item in scene.objects:
+            assert not isinstance(item, str) or load_object(item).name
+
+
+def test_thin_is_a_camouflaged_usb_stick_on_cloth_uneven_by_six_tenths_of_a_millimetre() -> None:
+    suite = load_suite("thin")
+    assert suite.scene.objects == ("usb_stick",)
+    assert suite.scene.cloth_unevenness == 0.0006
+    assert suite.scene.half_extent == 0.15
+    assert suite.scene.camouflage
+    assert suite.episode_config().start_jitter == 0.05
+
+
+def test_unseen_takes_its_four_toys_in_turn() -> None:
+    suite = load_suite("unseen")
+    names = [suite.scene_config(episode).objects for episode in range(8)]
+    assert len(set(names[:4])) == 4
+    assert names[4:] == names[:4]
+
+
+def test_callers_decide_camera_and_noise() -> None:
+    config = load_suite("thin").episode_config(camera="ray", noise=False)
+    assert (config.camera_backend, config.noise) == ("ray", False)
+
+
+def test_unknown_suite_lists_the_known_ones() -> None:
+    with pytest.raises(ConfigError, match=r"unknown suite.*'thick'.*thin, unseen"):
+        load_suite("thick")
+
+
+def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('title = "Mine"\n[scene]\nobjects = ["key"]\n')
+    suite = load_suite(str(file))
+    assert (suite.name, suite.title, suite.scene.objects) == ("mine", "Mine", ("key",))
+
+
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [
+        ({"scene": {}}, "no title"),
+        (MINIMAL | {"objects": ["key"]}, "unknown key.*'objects'.*title, scene, turns, episode"),
+        (MINIMAL | {"scene": {"cloth": 1}}, "unknown key.*'cloth'.*cloth_unevenness"),
+        (MINIMAL | {"turns": [{"cloth": 1}]}, "unknown key.*'cloth'"),
+        (MINIMAL | {"turns": []}, "no scene"),
+        (MINIMAL | {"turns": {"objects": ["key"]}}, "not a list of tables"),
+        (MINIMAL | {"scene": ["key"]}, "not a table"),
+        (MINIMAL | {"scene": {"cloth_unevenness": -1.0}}, "unevenness"),
+        (MINIMAL | {"scene": {"cloth_unevenness": "deep"}}, "suite 's'"),
+    ],
+)
+def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        parse_suite("s", declared)
+
+
+def test_unknown_episode_setting_is_refused() -> None:
+    with pytest.raises(ConfigError, match="unknown key.*'speed'"):
+        parse_suite("s", MINIMAL | {"episode": {"speed": 1}}).episode_config()
+
+
+def test_broken_toml_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "broken.toml"
+    file.write_text("title = ")
+    with pytest.raises(ConfigError, match="not valid TOML"):
+        load_suite(str(file))
+    with pytest.raises(ConfigError, match="unreadable suite"):
+        load_suite(str(tmp_path / "absent.toml"))
+
+
+def test_suites_are_frozen() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        parse_suite("s", MINIMAL).name = "other"  # type: ignore[misc]
+
+
+def test_a_suite_needs_a_scene() -> None:
+    with pytest.raises(ConfigError, match="no scene"):
+        Suite(name="s", title="t", scenes=())
+
+
+def test_episode_seeds_differ_between_episodes_seeds_and_suites() -> None:
+    seeds = {episode_seed(s, k, e) for s in ("thin", "unseen") for k in range(10) for e in range(100)}
+    assert len(seeds) == 2 * 10 * 100
+
+
+def test_episode_seed_is_the_same_on_every_machine() -> None:
+    assert episode_seed("thin", 0, 0) == 0
+    assert episode_seed("thin", 0, 1) == 0
+
+
+@pytest.mark.parametrize(("seed", "episode"), [(-1, 0), (0, -1)])
+def test_negative_seeds_and_episodes_are_refused(seed: int, episode: int) -> None:
+    with pytest.raises(ConfigError):
+        episode_seed("thin", seed, episode)
