@@ -5,11 +5,13 @@ An editable install gets none of it, since `mpgrasp/paths.py` then finds the fol
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-DATA_FOLDERS = ("assets", "scenes", "benchmarks")
+DATA = ("assets/*", "scenes/*", "benchmarks/*.toml", "benchmarks/README.md")
+"""Patterns of files and folders."""
 
 
 class DataFolders(BuildHookInterface):
@@ -17,4 +19,7 @@ class DataFolders(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "standard":
-            build_data["force_include"] |= {name: f"mpgrasp/_data/{name}" for name in DATA_FOLDERS}
+            root = Path(self.root)
+            for path in (path for pattern in DATA for path in sorted(root.glob(pattern))):
+                if path.name != "__pycache__":
+                    build_data["force_include"][str(path)] = f"mpgrasp/_data/{path.relative_to(root)}"

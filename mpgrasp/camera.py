@@ -19,7 +19,8 @@ from mpgrasp import sensor_noise
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.rasteriser import FAR, NEAR, Rasteriser, gl_context
+from mpgrasp.rasteriser import Rasteriser, gl_context
+from mpgrasp.ray_caster import ray_cast
 from mpgrasp.sensor_noise import DepthNoise
 
 D435_INTRINSICS = CameraIntrinsics(fx=385.0, fy=385.0, cx=319.5, cy=239.5, width=640, height=480)
@@ -80,7 +81,9 @@ class WristCamera:
         index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA.value, self._camera)
         if index < 0:
             names = [self._model.camera(i).name for i in range(self._model.ncam)]
-            raise CameraError("the model has no such camera", got=self._camera, allowed=names or "none in this model")
+            raise CameraError(
+                "the model has no such camera", got=self._camera, allowed=names or "none in this model"
+            )
         return transform(data.cam_xmat[index].reshape(3, 3) @ _MUJOCO_TO_OPENCV, data.cam_xpos[index])
 
     def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
@@ -94,7 +97,7 @@ class WristCamera:
     def render(
         self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator | None = None
     ) -> DepthFrame:
-        """Depth from an OpenCV camera at `T_world_camera` (4, 4); with the sensor's noise if `rng` is given."""
+        """Depth from an OpenCV camera at `T_world_camera` (4, 4); with the sensor's noise if `rng` is."""
         depth = self._depth(data, T_world_camera)
         if rng is not None and self.noise is not None:
             depth = sensor_noise.apply(depth, self._seen, rng, self.noise)
@@ -113,7 +116,9 @@ class WristCamera:
             self._colour_rasteriser = Rasteriser(
                 self._model, self.intrinsics, colour=True, geom_groups=self._geom_groups
             )
-        return self._colour_rasteriser.render(data, self.pose(data) if T_world_camera is None else T_world_camera)
+        return self._colour_rasteriser.render(
+            data, self.pose(data) if T_world_camera is None else T_world_camera
+        )
 
     def close(self) -> None:
         """Free GL resources; a later image makes new ones."""
@@ -128,43 +133,6 @@ class WristCamera:
         if self._depth_rasteriser is None:
             self._depth_rasteriser = Rasteriser(self._model, self._seen, geom_groups=self._geom_groups)
         return self._depth_rasteriser.render(data, T_world_camera)
-
-
-def ray_cast(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    intrinsics: CameraIntrinsics,
-    T_world_camera: FloatArray,
-    geom_groups: tuple[int, ...] = (0, 1, 2),
-) -> NDArray[np.float32]:
-    """Z-depth (H, W) [m] by one ray through every pixel's centre; NaN where nothing is hit."""
-    rays = _pixel_rays(intrinsics)
-    # rays have unit z, not unit length, so that MuJoCo's distance along them is the z-depth
-    directions = rays @ T_world_camera[:3, :3].T
-    groups = np.array([group in geom_groups for group in range(mujoco.mjNGROUP)], np.uint8)
-    n = len(directions)
-    distance, geom = np.empty(n), np.empty(n, np.int32)
-    origin = np.ascontiguousarray(T_world_camera[:3, 3], float)
-    mujoco.mj_multiRay(
-        model, data, origin, directions.reshape(-1), groups, True, -1, geom, distance, None, n, FAR
-    )
-    for i in np.flatnonzero((distance >= 0) & (distance < NEAR)):
-        # look past what the near plane of the rasterised image would cut away
-        distance[i] = mujoco.mj_ray(
-            model, data, origin + NEAR * directions[i], directions[i], groups, True, -1, geom[:1]
-        )
-        distance[i] += NEAR if distance[i] >= 0 else 0
-    distance[(distance < 0) | (distance > FAR)] = np.nan
-    return distance.astype(np.float32).reshape(intrinsics.height, intrinsics.width)
-
-
-@functools.lru_cache(maxsize=8)
-def _pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
-    """Camera-frame directions (H * W, 3) of all pixels, scaled to z = 1."""
-    v, u = np.indices((intrinsics.height, intrinsics.width))
-    rays = intrinsics.deproject(u, v, np.ones(u.shape)).reshape(-1, 3)
-    rays.flags.writeable = False
-    return rays
 
 
 def _gl_usable(backend: str) -> bool:

@@ -47,7 +47,9 @@ class CameraIntrinsics:
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1 or min(self.fx, self.fy) <= 0:
-            raise ConfigError("unusable camera intrinsics", got=self, allowed="positive size and focal lengths")
+            raise ConfigError(
+                "unusable camera intrinsics", got=self, allowed="positive size and focal lengths"
+            )
 
     def crop(self, row: float, col: float, height: int, width: int) -> CameraIntrinsics:
         """Intrinsics of the window whose top-left pixel is (row, col)."""
@@ -117,9 +119,8 @@ class DepthFrame:
 
     def world_points(self) -> FloatArray:
         """World points (H, W, 3) [m] of all pixels; NaN where there was no return."""
-        v, u = np.indices(self.depth.shape, sparse=True)
-        z = self.depth.astype(float)
-        camera = self.intrinsics.deproject(*np.broadcast_arrays(u, v), z)
+        v, u = np.indices(self.depth.shape).astype(float)
+        camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
         return transform_points(self.T_world_camera, camera)
 
     def pixels(self, points: FloatArray) -> FloatArray:
@@ -131,19 +132,20 @@ def crop_resize(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -
     """The central square of `crop` px, resized to `size` px.
 
     Each new pixel takes the surface of the old pixel at its centre, averaged by area over the part of its
-    footprint that lies within `EDGE_GAP` of it: noise is averaged, while no depth is invented between an object
-    and its background and no hole spreads. Where the centre is a hole, so is the new pixel.
+    footprint that lies within `EDGE_GAP` of it: noise is averaged, while no depth is invented between an
+    object and its background and no hole spreads. Where the centre is a hole, so is the new pixel.
 
     Raises:
         ConfigError: the image is smaller than `crop`, or `size` < 1.
     """
     if size < 1:
         raise ConfigError("unusable image size [px]", got=size, allowed="1 or more")
-    row, col = _centre_window(*frame.depth.shape, crop)
+    row, col = _centre_window(frame.intrinsics.height, frame.intrinsics.width, crop)
     window = np.s_[row : row + crop, col : col + crop]
     rgb = None
     if frame.rgb is not None:
-        rgb = np.asarray(cv2.resize(frame.rgb[window], (size, size), interpolation=cv2.INTER_AREA))
+        resized = cv2.resize(frame.rgb[window], (size, size), interpolation=cv2.INTER_AREA)
+        rgb = np.asarray(resized, np.uint8)
     return replace(
         frame,
         depth=_resize_by_area(frame.depth[window], size),
@@ -173,7 +175,7 @@ def _resize_by_area(depth: NDArray[np.float32], size: int) -> NDArray[np.float32
 
 @functools.lru_cache(maxsize=8)
 def _footprint(old: int, new: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Old pixels under each new one along an axis: index (k, new), overlap (k, new) and the central one (new,)."""
+    """Old pixels under each new one along an axis: index and overlap (k, new), and the central one (new,)."""
     start = np.arange(new) * old / new
     end = start + old / new
     index = np.floor(start).astype(int) + np.arange(int(np.ceil(old / new)) + 1)[:, None]

@@ -12,6 +12,7 @@ References:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import mink
 import mujoco
@@ -19,7 +20,7 @@ import numpy as np
 
 from mpgrasp import panda
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, invert, rotation_vector, transform
+from mpgrasp.geometry import FloatArray, rotation_vector, transform
 
 TCP_SITE = "tcp"
 
@@ -95,12 +96,18 @@ class IkSolution:
     """What the limit allows, same unit."""
 
 
+@cache
+def _arm_model() -> mujoco.MjModel:
+    # compiled once: nobody writes to it
+    return panda.arm_model()
+
+
 class DifferentialIK:
     """Follows a desired tool pose with the arm-only model of the Panda."""
 
     def __init__(self, config: IkConfig | None = None, model: mujoco.MjModel | None = None) -> None:
         self.config = config or IkConfig()
-        self.model = panda.arm_model() if model is None else model
+        self.model = _arm_model() if model is None else model
         self.configuration = mink.Configuration(self.model, q=np.array(panda.Q_HOME))
         self._site = self.model.site(TCP_SITE).id
         self._frame = mink.FrameTask(TCP_SITE, "site", position_cost=1.0, orientation_cost=1.0)
@@ -180,6 +187,41 @@ class DifferentialIK:
             blocked_bound=blocked[3],
         )
 
+    def solve(
+        self, q0: FloatArray, T_world_tcp: FloatArray, *, tolerance: float = 1e-5, iterations: int = 400
+    ) -> FloatArray:
+        """Joint positions (7,) [rad] that put the tool at a pose, found by iterating `step`.
+
+        Leaves a motion that is under way undisturbed.
+
+        Args:
+            q0: where to start (7,) [rad].
+            T_world_tcp: wanted pose (4, 4).
+            tolerance: of the pose, in m and rad.
+            iterations: how many steps to try.
+
+        Raises:
+            ConfigError: if the pose is out of reach within joint and collision limits.
+        """
+        swing, self._swing = self._swing, np.zeros(7)
+        q, dt = np.array(q0, float), 0.05
+        try:
+            for _ in range(iterations):
+                T = self.pose(q)
+                error = pose_error(T, T_world_tcp)
+                if np.linalg.norm(error) < tolerance:
+                    return q
+                # 10 cm and half a radian at a time keep the linearisation honest
+                lengths = np.linalg.norm(error[:3]) / 0.1, np.linalg.norm(error[3:]) / 0.5
+                q = q + self.step(q, integrate_pose(T, error, 1.0 / max(1.0, *lengths)), dt).dq * dt
+        finally:
+            self._swing = swing
+        raise ConfigError(
+            "tool pose is out of reach",
+            got=np.round(T_world_tcp[:3, 3], 4).tolist(),
+            allowed="tool down, up to 0.74 m from the base at 0.4 m height and 0.79 m near the table",
+        )
+
     def _jacobian(self) -> FloatArray:
         J = np.empty((6, 7))
         mujoco.mj_jacSite(self.model, self.configuration.data, J[:3], J[3:], self._site)
@@ -240,43 +282,9 @@ def pose_error(T_from: FloatArray, T_to: FloatArray) -> FloatArray:
     return np.concatenate([T_to[:3, 3] - T_from[:3, 3], rotation])
 
 
-def solve_pose(
-    q0: FloatArray,
-    T_world_tcp: FloatArray,
-    ik: DifferentialIK | None = None,
-    *,
-    tolerance: float = 1e-5,
-    iterations: int = 400,
-) -> FloatArray:
-    """Joint positions (7,) [rad] that put the tool at a pose, found from `q0` (7,) by iterated IK.
-
-    Args:
-        q0: where to start [rad].
-        T_world_tcp: wanted pose (4, 4).
-        ik: solver to use; a new one by default.
-        tolerance: of the pose, in m and rad.
-        iterations: how many steps to try.
-
-    Raises:
-        ConfigError: if the pose is out of reach within joint and collision limits.
-    """
-    ik = ik or DifferentialIK()
-    ik.reset()
-    q, dt = np.array(q0, float), 0.05
-    for _ in range(iterations):
-        error = pose_error(ik.pose(q), T_world_tcp)
-        if np.linalg.norm(error) < tolerance:
-            ik.reset()
-            return q
-        # half a radian and 10 cm at a time keep the linearisation honest
-        share = min(1.0, 0.1 / (np.linalg.norm(error[:3]) + 1e-12), 0.5 / (np.linalg.norm(error[3:]) + 1e-12))
-        q = q + ik.step(q, integrate_pose(ik.pose(q), error, share), dt).dq * dt
-    ik.reset()
-    raise ConfigError(
-        "tool pose is out of reach",
-        got=np.round(T_world_tcp[:3, 3], 4).tolist(),
-        allowed="a pose within joint limits, about 0.78 m from the base at table height",
-    )
+def solve_pose(q0: FloatArray, T_world_tcp: FloatArray, ik: DifferentialIK | None = None) -> FloatArray:
+    """Joint positions (7,) [rad] that put the tool at a pose; see `DifferentialIK.solve`."""
+    return (ik or DifferentialIK()).solve(q0, T_world_tcp)
 
 
 def integrate_pose(T: FloatArray, twist: FloatArray, dt: float) -> FloatArray:

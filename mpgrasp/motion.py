@@ -1,4 +1,4 @@
-"""Ramped twists, straight-line moves and the 100 Hz loop that drives the arm under protective stops.
+"""The 100 Hz velocity loop: twists and straight-line moves of the arm under protective stops.
 
 Every motion is a sequence of desired tool poses, one per tick of 10 ms. Differential IK follows the
 desired pose on the commanded joint positions, not on the measured ones, so neither servo lag nor
@@ -15,110 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, transform, wrap_half_pi
+from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.ik import DifferentialIK, IkSolution, integrate_pose, pose_error
 from mpgrasp.reflex import Reflex, ReflexMonitor
 from mpgrasp.simulation import Simulation
+from mpgrasp.trajectory import MotionConfig, TwistRamp, path_profile
 
-
-@dataclass(frozen=True, kw_only=True)
-class MotionConfig:
-    """How briskly the arm moves, and when a singularity is called near."""
-
-    dt: float = 0.01
-    """Period of the velocity loop [s]."""
-    linear_acceleration: float = 1.0
-    """[m/s2]. At the smallest singular value of the workspace, 0.10, this asks at most 10 rad/s2 of one
-    joint in the worst direction; the FER allows 7.5 to 20."""
-    angular_acceleration: float = 4.0
-    """[rad/s2]"""
-    smoothing: int = 5
-    """Ticks over which the ramped velocity is averaged: bounds the jerk at 2 a / (smoothing dt)."""
-    max_speed: float = 0.25
-    """Of pose moves [m/s]."""
-    max_rotation: float = 1.5
-    """Of pose moves [rad/s]."""
-    singularity_warning: float = 0.05
-    """Smallest singular value below which time counts as near a singularity."""
-
-    def __post_init__(self) -> None:
-        for name in (
-            "dt", "linear_acceleration", "angular_acceleration", "max_speed", "max_rotation",
-            "singularity_warning",
-        ):  # fmt: skip
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
-        if self.smoothing < 1:
-            raise ConfigError("smoothing counts ticks", got=self.smoothing, allowed="1 or more")
-
-
-class TwistRamp:
-    """Follows a wanted twist with bounded acceleration and jerk, without overshoot.
-
-    A rate limiter bounds the acceleration; the mean of its last `smoothing` values bounds the jerk and
-    cannot exceed the acceleration of what it averages.
-    """
-
-    def __init__(self, config: MotionConfig | None = None) -> None:
-        self.config = config or MotionConfig()
-        self.reset()
-
-    def reset(self, twist: FloatArray | None = None) -> None:
-        """Start from a constant twist (6,); at rest by default."""
-        start = np.zeros(6) if twist is None else np.array(twist, float)
-        self._limited = start
-        self._recent = deque([start] * self.config.smoothing, maxlen=self.config.smoothing)
-
-    @property
-    def twist(self) -> FloatArray:
-        """The ramped twist (6,) of the last tick [m/s, rad/s]."""
-        return np.mean(self._recent, axis=0)
-
-    def step(self, wanted: FloatArray) -> FloatArray:
-        """The twist (6,) of the next tick on the way to `wanted` (6,)."""
-        c = self.config
-        step = np.asarray(wanted, float) - self._limited
-        for part, bound in ((slice(0, 3), c.linear_acceleration), (slice(3, 6), c.angular_acceleration)):
-            length = float(np.linalg.norm(step[part]))
-            if length > bound * c.dt:
-                step[part] *= bound * c.dt / length
-        self._limited = self._limited + step
-        self._recent.append(self._limited)
-        return self.twist
-
-
-def path_profile(length: float, angle: float, config: MotionConfig, speed: float, rotation: float) -> FloatArray:
-    """Shares of a straight-line move after each tick, (n,), from just above 0 to 1.
-
-    A trapezoid of velocity, smoothed as `TwistRamp` does, that keeps both the linear and the angular
-    bounds of speed and acceleration.
-
-    Args:
-        length: of the move [m].
-        angle: of the move [rad].
-        config: accelerations, period and smoothing.
-        speed: bound [m/s].
-        rotation: bound [rad/s].
-    """
-    if length < 1e-9 and angle < 1e-9:
-        return np.empty(0)
-    v = min(speed / max(length, 1e-9), rotation / max(angle, 1e-9))  # share per second
-    a = min(config.linear_acceleration / max(length, 1e-9), config.angular_acceleration / max(angle, 1e-9))
-    v = min(v, np.sqrt(a))  # a short move is a triangle
-    duration = 1.0 / v + v / a
-    t = np.arange(config.dt, duration + config.dt, config.dt)
-    ramp = np.clip(np.minimum(a * t, a * (duration - t)), 0.0, v)
-    velocity = np.convolve(ramp, np.full(config.smoothing, 1.0 / config.smoothing))
-    share = np.cumsum(velocity)
-    return share / share[-1]
-
-
-def nearest_yaw(angle: float, yaw: float) -> float:
-    """The heading [rad] of grasp line `angle` that lies within 90 degrees of heading `yaw`.
-
-    A grasp is the same after half a turn; the far one sends differential IK the long way round.
-    """
-    return yaw + float(wrap_half_pi(angle - yaw))
+FORCE_WINDOW = 5
+"""Ticks over which the external force is averaged before it can stop the arm. The arm weighs some 20 kg as
+seen from the tool; touching a hard table at 0.05 m/s is 1 N s, 100 N over one tick, and breaks nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +95,7 @@ class ArmDriver:
         self._start = self.simulation.time
         self._dq = np.zeros(7)
         self._twist = np.zeros(6)
+        self._forces: deque[FloatArray] = deque([np.zeros(3)] * FORCE_WINDOW, maxlen=FORCE_WINDOW)
         self._velocities: deque[FloatArray] = deque(maxlen=3)
         self._position = np.array(self.simulation.T_world_tcp[:3, 3])
         self._path_length = self._jerk_sum = self._near = 0.0
@@ -213,6 +119,16 @@ class ArmDriver:
     def twist_achieved(self) -> FloatArray:
         """(6,) measured twist, world axes [m/s, rad/s]."""
         return self.simulation.twist_tcp
+
+    @property
+    def touch(self) -> float:
+        """External force on the robot over the last tick [N]: exact and instant, for feeling the way."""
+        return float(np.linalg.norm(self._forces[-1]))
+
+    @property
+    def external_force(self) -> float:
+        """External force on the robot, mean over `FORCE_WINDOW` ticks [N]: what a stop is judged by."""
+        return float(np.linalg.norm(np.mean(self._forces, axis=0)))
 
     @property
     def min_singular_value(self) -> float:
@@ -343,10 +259,11 @@ class ArmDriver:
         sim.step(self.steps_per_tick)
         self._physics_seconds += time.perf_counter() - clock
         T, achieved = sim.T_world_tcp, sim.twist_tcp
+        self._forces.append(sim.external_force)
         self._observe(twist, T, achieved)
         self.monitor.check(
             time=sim.time, dt=c.dt, solution=self.solution, q=sim.q, dq=sim.dq, twist=achieved,
-            T_world_tcp=T, T_world_tcp_desired=T_desired, contact_force=sim.contact_force(),
+            T_world_tcp=T, T_world_tcp_desired=T_desired, contact_force=self.external_force,
         )  # fmt: skip
         if self.reflex is not None:
             # brakes on: hold where the arm is

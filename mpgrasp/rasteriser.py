@@ -54,7 +54,7 @@ def gl_context() -> Any:
     except Exception as error:  # each platform's binding raises types of its own
         raise CameraError(
             f"OpenGL cannot be initialised: {type(error).__name__}: {error}",
-            allowed='a machine with EGL (libegl1 and a driver such as Mesa), or backend="ray", which needs no GL',
+            allowed='a machine with EGL (libegl1 and a driver such as Mesa), or backend "ray" without GL',
         ) from error
     return context
 

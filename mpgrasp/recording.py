@@ -1,12 +1,14 @@
-"""What an episode tells a recorder, and the recorder that keeps nothing."""
+"""What an episode tells a recorder, the recorder that keeps nothing and the one that tells several others."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from mpgrasp.depth import DepthFrame
+from mpgrasp.exceptions import OutputError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
 
@@ -61,3 +63,42 @@ class NullRecorder:
 
     def finish(self, event: str) -> None:
         pass
+
+
+class TeeRecorder:
+    """Shows everything to several recorders, in their order."""
+
+    def __init__(self, *recorders: Recorder) -> None:
+        self.recorders = recorders
+
+    def start(self, simulation: Simulation) -> None:
+        for recorder in self.recorders:
+            recorder.start(simulation)
+
+    def tick(self, record: TickRecord) -> None:
+        for recorder in self.recorders:
+            recorder.tick(record)
+
+    def finish(self, event: str) -> None:
+        for recorder in self.recorders:
+            recorder.finish(event)
+
+
+def claim_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    """Make sure, before an episode is played, that its recording can be written; creates directories.
+
+    Raises:
+        OutputError: another suffix, or a place that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise OutputError("unknown kind of recording", got=str(path), allowed=suffixes)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb"):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"a recording cannot be written: {error.strerror}", got=str(path), allowed="a writable directory"
+        ) from error
+    return path

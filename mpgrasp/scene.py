@@ -63,7 +63,7 @@ class SceneConfig:
             raise ConfigError("unusable centre of the placing region", got=self.centre, allowed="x and y [m]")
         _within("half extent of the placing region [m]", self.half_extent, 0.0, 0.4)
         _within("unevenness of the cloth [m]", self.cloth_unevenness, 0.0, 0.01)
-        _within("wavelength of the cloth [m]", self.cloth_wavelength, 0.03, 1.0)
+        _within("wavelength of the cloth [m]", self.cloth_wavelength, 0.04, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -223,3 +223,11 @@ def _one_of(what: str, value: object, allowed: tuple[str, ...]) -> None:
 def _within(what: str, value: float, low: float, high: float) -> None:
     if not low <= value <= high:
         raise ConfigError(f"{what} out of range", got=value, allowed=f"{low} to {high}")
+
+
+if __name__ == "__main__":
+    import sys
+
+    from mpgrasp.scene_file import main
+
+    sys.exit(main())

@@ -1,9 +1,9 @@
 """What a stereo depth camera makes of the true depth image: noise, steps, shadows, holes.
 
-The model is that of an Intel RealSense D435, whose depth is f B / disparity with the disparity matched between
-two imagers a baseline apart (Keselman et al. 2017, "Intel RealSense stereoscopic depth cameras"; Intel, "Best known
-methods for tuning RealSense D400 depth cameras", 2018-2020). Lengths in pixels are the sensor's, at its own
-focal length, and are scaled to whatever image is at hand.
+The model is that of an Intel RealSense D435, whose depth is f B / disparity with the disparity matched
+between two imagers a baseline apart (Keselman et al. 2017, "Intel RealSense stereoscopic depth cameras";
+Intel, "Best known methods for tuning RealSense D400 depth cameras"). Lengths in pixels are the sensor's, at
+its own focal length, and are scaled to whatever image is at hand.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ class DepthNoise:
     focal_px: float = 447.0
     """Focal length at which disparities are matched [px]; D435 at 848 x 480."""
     subpixel: float = 0.08
-    """Standard deviation of the disparity [px]; Intel's tuning guide gives 0.05 to 0.1 for textured targets."""
+    """Standard deviation of the disparity [px]; Intel's tuning guide expects below 0.1 when well tuned."""
     correlation_px: float = 2.0
-    """Standard deviation of the Gaussian that correlates neighbouring disparities [px]; matching windows overlap."""
+    """Standard deviation of the Gaussian that correlates neighbouring disparities [px]; assumed, because
+    matching windows overlap."""
     disparity_step: float = 1 / 32
     """Quantum of the reported disparity [px]; the D4 chip matches to five fractional bits."""
     min_z: float = 0.18
@@ -37,8 +38,8 @@ class DepthNoise:
     shadows: bool = True
     """Whether background that the right imager cannot see is missing."""
     max_incidence: float = float(np.deg2rad(82.0))
-    """Surfaces seen at a larger angle from their normal are missing [rad]; there, a matching window 5 px wide spans
-    more than one pixel of disparity at half a metre."""
+    """Surfaces seen at a larger angle from their normal are missing [rad]; assumed: at half a metre a
+    matching window a few pixels wide then spans several pixels of disparity."""
     multiplicative: float = 0.0
     """Stress mode, not a D435: standard deviation of white noise that multiplies the depth [-]."""
 
@@ -57,7 +58,7 @@ class DepthNoise:
         return z * z * self.subpixel / (self.focal_px * self.baseline)
 
     def shadow_px(self, z_near: float, z_far: float, focal_px: float) -> float:
-        """Width of the shadow [px] that an edge at z_near [m] casts on z_far [m] in an image of `focal_px`."""
+        """Width of the shadow [px] that an edge at z_near casts on z_far [m] in an image of `focal_px`."""
         return focal_px * self.baseline * (1 / z_near - 1 / z_far)
 
     def margin_px(self, intrinsics: CameraIntrinsics) -> int:
@@ -117,7 +118,8 @@ def _correlated_noise(
     if radius == 0 or blur_px < 0.3:
         return white
     kernel = cv2.getGaussianKernel(2 * radius + 1, blur_px, cv2.CV_32F)
-    kernel /= np.linalg.norm(kernel)  # of a separable filter's output, the variance is the product of both norms^2
+    # white noise through a separable filter has the product of both kernels' squared norms for its variance
+    kernel = np.asarray(kernel / np.linalg.norm(kernel), np.float32)
     # wrapping round keeps the variance even at the border, where reflecting would double it
     padded = np.pad(white, radius, mode="wrap")
     blurred = cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel)
@@ -127,8 +129,9 @@ def _correlated_noise(
 def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Pixels (H, W) that the right imager cannot see, from disparities in pixels of this image.
 
-    The depth image is the left imager's. A point of column u falls on column u - disparity of the right one and
-    is hidden there if something further right in the left image, hence nearer, falls on the same or a lower column.
+    The depth image is the left imager's. A point of column u falls on column u - disparity of the right
+    one and is hidden there if something further right in the left image, hence nearer, falls on the same
+    column or on a lower one.
     """
     column = np.arange(disparity.shape[1], dtype=np.float32)
     right = column - disparity
@@ -146,14 +149,15 @@ def _grazing(
 ) -> NDArray[np.bool_]:
     """Pixels (H, W) of surfaces whose slope against the image plane is beyond `max_incidence` [rad].
 
-    A slope counts only where it goes on to both sides of a pixel, so that the rim of a flat object is kept.
+    A slope counts only where it goes on to both sides of a pixel, so that rims and narrow things are kept.
     """
     bound = np.float32(np.tan(max_incidence))
     grazing = np.zeros(depth.shape, bool)
-    for axis, focal in ((1, intrinsics.fx), (0, intrinsics.fy)):
-        step = np.abs(np.diff(depth, axis=axis))
-        middle = depth[:, 1:-1] if axis == 1 else depth[1:-1]
-        first, second = (step[:, :-1], step[:, 1:]) if axis == 1 else (step[:-1], step[1:])
-        steep = np.fmin(first, second) > middle * np.float32(bound / focal)
-        (grazing[:, 1:-1] if axis == 1 else grazing[1:-1])[...] |= steep
+    for step, middle, target, focal in (
+        (np.diff(depth, axis=1), depth[:, 1:-1], grazing[:, 1:-1], intrinsics.fx),
+        (np.diff(depth, axis=0).T, depth[1:-1].T, grazing[1:-1].T, intrinsics.fy),
+    ):
+        before, after = step[..., :-1], step[..., 1:]
+        steepest = np.maximum(np.minimum(before, after), -np.maximum(before, after))
+        target[...] |= steepest > middle * np.float32(bound / focal)
     return grazing

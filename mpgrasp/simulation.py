@@ -77,14 +77,18 @@ class Simulation:
         panda.set_home(self.model, self.data)
         self._grip_force: float | None = None
         self._width_target = panda.GRIPPER_MAX_WIDTH
+        self._mean_external_force = np.zeros(3)
         self.set_q(panda.Q_HOME)
 
     def step(self, n: int = 1) -> None:
         """Advance by n time steps."""
+        total = np.zeros(3)
         for _ in range(n):
             self._drive_arm()
             self._drive_gripper()
             mujoco.mj_step(self.model, self.data)
+            total += self._external_force()
+        self._mean_external_force = total / max(n, 1)
         mujoco.mj_forward(self.model, self.data)
 
     # ---- arm --------------------------------------------------------------------------------------------------
@@ -138,24 +142,22 @@ class Simulation:
         """
         self._q_target = np.clip(q, panda.Q_MIN, panda.Q_MAX)
         self._dq_target = np.array(dq, float)
-        self._ramp_steps = round(SERVO_PERIOD / self.model.opt.timestep)
+        self._ramp_steps = round(SERVO_PERIOD / self._dt)
 
     def _drive_arm(self) -> None:
         if self._ramp_steps == 0:
-            self.data.ctrl[self._arm_actuators] = self._q_target
+            self._arm_ctrl[:] = self._q_target
             return
         self._ramp_steps -= 1
-        lead = self._ramp_steps * self.model.opt.timestep
-        # The servo damps against standstill; the second term makes it damp against dq instead.
-        reference = self._q_target + self._dq_target * (self._servo_lead - lead)
-        self.data.ctrl[self._arm_actuators] = reference
+        # The servo damps against standstill; its lead, kv / kp, makes it damp against dq instead.
+        self._arm_ctrl[:] = self._q_target + self._dq_target * (self._servo_lead - self._ramp_steps * self._dt)
 
     # ---- gripper ----------------------------------------------------------------------------------------------
 
     @property
     def gripper_width(self) -> float:
         """Opening between the pads [m]."""
-        return float(self.data.qpos[self._fingers].sum())
+        return float(self._finger_qpos[0] + self._finger_qpos[1])
 
     def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
         """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at what the hand can do."""
@@ -177,16 +179,15 @@ class Simulation:
         self._grip_force = float(force)
 
     def _drive_gripper(self) -> None:
-        reference = self.data.ctrl[self._gripper]
-        dt = self.model.opt.timestep
+        reference = float(self._gripper_ctrl[0])
         if self._grip_force is None:
-            change = self._width_target - reference
-            limit = panda.GRIPPER_SPEED * dt
-            self.data.ctrl[self._gripper] = reference + min(max(change, -limit), limit)
+            limit = panda.GRIPPER_SPEED * self._dt
+            reference += min(max(self._width_target - reference, -limit), limit)
         else:
             # The servo pulls with its stiffness times the lag: never let it lag by more than the force asked for.
             floor = self.gripper_width - self._grip_force / self._gripper_stiffness
-            self.data.ctrl[self._gripper] = max(reference - panda.GRIPPER_CLOSE_SPEED * dt, floor)
+            reference = max(reference - panda.GRIPPER_CLOSE_SPEED * self._dt, floor)
+        self._gripper_ctrl[0] = reference
 
     # ---- contacts and objects ---------------------------------------------------------------------------------
 
@@ -213,6 +214,28 @@ class Simulation:
     def finger_contact_force(self) -> float:
         """The same for the hand, the camera and the fingers only [N]."""
         return self._largest_force(self._is_hand)
+
+    @property
+    def external_force(self) -> FloatArray:
+        """Net contact force (3,) on the robot [N], world axes, as a mean over the last `step`.
+
+        The forces of both pads on a held object cancel, as they do in the estimate of a real arm. One
+        instant says little: hard contacts hit for a millisecond with hundreds of newtons.
+        """
+        return self._mean_external_force.copy()
+
+    def _external_force(self) -> FloatArray:
+        total = np.zeros(3)
+        geom = self.data.contact.geom
+        if not len(geom):
+            return total
+        robot = self._owner[geom] == _ROBOT
+        for i in np.flatnonzero(robot.sum(axis=1) == 1):
+            mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
+            # rows of the contact frame are its axes; the force acts from the first geom on the second
+            force = self._wrench[:3] @ self.data.contact.frame[i].reshape(3, 3)
+            total += force if robot[i, 1] else -force
+        return total
 
     def object_pose(self, name: str) -> FloatArray:
         """Pose (4, 4) of an object's body frame in the world.
@@ -279,20 +302,23 @@ class Simulation:
     def _index_robot(self) -> None:
         model, prefix = self.model, panda.PREFIX
         try:
-            joints = [model.joint(prefix + name) for name in panda.ARM_JOINTS]
-            self._fingers = np.array([model.joint(prefix + n).qposadr[0] for n in panda.FINGER_JOINTS])
-            self._arm_actuators = np.array([model.actuator(prefix + n).id for n in panda.ARM_JOINTS])
-            self._gripper = model.actuator(prefix + "gripper").id
+            first, finger = model.joint(prefix + panda.ARM_JOINTS[0]), model.joint(prefix + panda.FINGER_JOINTS[0])
+            arm, gripper = model.actuator(prefix + panda.ARM_JOINTS[0]).id, model.actuator(prefix + "gripper").id
             self._tcp = model.site(prefix + "tcp").id
         except KeyError as error:
             raise ConfigError(
                 "the scene has no robot", got=str(error), allowed="build_scene(..., robot=True)"
             ) from error
-        self._qpos = np.array([joint.qposadr[0] for joint in joints])
-        self._dofs = np.array([joint.dofadr[0] for joint in joints])
-        self._gripper_stiffness = float(model.actuator_gainprm[self._gripper, 0])
-        stiffness = model.actuator_gainprm[self._arm_actuators, 0]
-        self._servo_lead = -model.actuator_biasprm[self._arm_actuators, 2] / stiffness  # kv / kp [s]
+        # Joints and actuators of one robot follow one another; slices give views, which are quick to write to.
+        self._qpos = slice(first.qposadr[0], first.qposadr[0] + 7)
+        self._dofs = slice(first.dofadr[0], first.dofadr[0] + 7)
+        self._finger_qpos = self.data.qpos[finger.qposadr[0] : finger.qposadr[0] + 2]
+        self._arm_ctrl = self.data.ctrl[arm : arm + 7]
+        self._gripper_ctrl = self.data.ctrl[gripper : gripper + 1]
+        self._dt = float(model.opt.timestep)
+        self._gripper_stiffness = float(model.actuator_gainprm[gripper, 0])
+        gain, bias = model.actuator_gainprm[arm : arm + 7], model.actuator_biasprm[arm : arm + 7]
+        self._servo_lead = -bias[:, 2] / gain[:, 0]  # kv / kp [s]
         self._wrench = np.zeros(6)
 
     def _index_owners(self) -> None:

@@ -14,7 +14,7 @@ CENTRE = (0.5, 0.0)
 """World x, y of the cloth's centre [m]."""
 HALF_EXTENT = 0.42
 """Half the cloth's edge [m]."""
-GRID = 0.005
+GRID = 0.007
 """Spacing of the height field's points [m]."""
 HEM = 0.03
 """The cloth flattens out towards its edge over this length [m]."""

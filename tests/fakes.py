@@ -94,3 +94,9 @@ def dies(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     import os
 
     os._exit(9)
+
+
+def unhurried(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Slow enough to be interrupted."""
+    time.sleep(0.1)
+    return FakeResult(seed, scene_config)

@@ -41,12 +41,19 @@ def test_impossible_counts_are_refused(successes: int, n: int) -> None:
 
 
 def test_cells_are_kept_apart_and_in_order() -> None:
-    cells = summarise([line(detector="b"), line(detector="a"), line(detector="b", success=False, outcome="missed")])
+    cells = summarise(
+        [line(detector="b"), line(detector="a"), line(detector="b", success=False, outcome="missed")]
+    )
     assert [(c["detector"], c["n"], c["successes"]) for c in cells] == [("b", 2, 1), ("a", 1, 1)]
 
 
 def test_failures_are_counted_by_cause_and_add_up() -> None:
-    lines = [line(), line(False, "missed"), line(False, "reflex", reflex={"limit": "velocity"}), line(False, "missed")]
+    lines = [
+        line(),
+        line(False, "missed"),
+        line(False, "reflex", reflex={"limit": "velocity"}),
+        line(False, "missed"),
+    ]
     (cell,) = summarise(lines)
     assert cell["failures"] == {"missed": 2, "reflex": 1}
     assert cell["reflex_stops"] == 1

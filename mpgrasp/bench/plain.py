@@ -20,7 +20,7 @@ def plain(value: Any) -> Any:
     """JSON-ready copy: dataclasses and mappings as dicts, arrays and sequences as lists.
 
     Floats keep `SIGNIFICANT_DIGITS`; NaN and infinities become None. What has no plain form is given
-    by its `repr`.
+    by the name of its class, which is the same in every process.
     """
     if value is None or (isinstance(value, bool | int | str) and not isinstance(value, Enum)):
         return value
@@ -41,7 +41,10 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, set | frozenset):
         return sorted((plain(item) for item in value), key=str)
-    return str(value) if isinstance(value, Path) else repr(value)
+    if isinstance(value, Path):
+        return str(value)
+    kind = value if isinstance(value, type) or callable(value) else type(value)
+    return f"{kind.__module__}.{getattr(kind, '__qualname__', type(kind).__qualname__)}"
 
 
 def one_line(record: Mapping[str, Any]) -> str:

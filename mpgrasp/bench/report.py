@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -17,31 +18,31 @@ from rich.progress import (
 )
 from rich.table import Table
 
-PIPED_WIDTH = 120
+PIPED_WIDTH = 160
 """Columns of a table that goes into a file or a pipe."""
 
 
 def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     """The table of a run from rows of `statistics.summarise`."""
-    table = Table(header_style="bold")
+    table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
     for heading in ("suite", "detector", "controller"):
-        table.add_column(heading, overflow="fold")
-    for heading in ("n", "successes", "rate", "95 % interval", "median time", "reflex stops"):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, overflow="fold", vertical="top")
+    for heading in ("n", "success", "rate\n%", "95 %\ninterval", "median\ntime s", "reflex\nstops"):
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("failures")
     for cell in cells:
-        failures = ", ".join(f"{count} {outcome}" for outcome, count in cell["failures"].items())
         table.add_row(
             cell["suite"],
             cell["detector"],
             cell["controller"],
             str(cell["n"]),
             str(cell["successes"]),
-            f"{100 * cell['rate']:.1f} %",
-            f"{100 * cell['wilson_low']:.1f} - {100 * cell['wilson_high']:.1f} %",
-            f"{cell['median_time_s']:.1f} s",
+            f"{100 * cell['rate']:.1f}",
+            f"{100 * cell['wilson_low']:.1f}-{100 * cell['wilson_high']:.1f}",
+            f"{cell['median_time_s']:.1f}",
             str(cell["reflex_stops"]),
-            failures or "none",
+            # no blank within a cause, so that it is never torn apart
+            " ".join(f"{outcome}:{count}" for outcome, count in cell["failures"].items()) or "none",
         )
     return table
 
@@ -104,7 +105,8 @@ class ProgressReport:
             self._bar.update(self._task, description=cell, completed=self._done, successes=self._successes)
         elif not self._quiet:
             text = (
-                f"[{self._done}/{self._total}] {line['suite']} episode {line['episode']}, {line['detector']}, "
-                f"{line['controller']}, {line['object']}: {line['outcome']} in {line['sim_time_s']:.1f} s"
+                f"[{self._done}/{self._total}] {line['suite']} episode {line['episode']}, "
+                f"{line['detector']}, {line['controller']}, {line['object']}: "
+                f"{line['outcome']} in {line['sim_time_s']:.1f} s"
             )
             self._console.out(text, highlight=False)

@@ -116,9 +116,7 @@ class Player:
         self.detectors = {name: load_detector(name, plan.weights.get(name)) for name in plan.detectors}
         self.controllers = {name: load_controller(name) for name in plan.controllers}
         self.episode_config = plan.suite.episode_config(camera=plan.camera, noise=plan.noise)
-        if run_episode is None:
-            from mpgrasp.episode import run_episode
-        self._run_episode = run_episode
+        self._run_episode = run_episode or _real_run_episode()
 
     def play(self, task: Task) -> Line:
         """The line of one episode, to go to episodes.jsonl.
@@ -161,6 +159,12 @@ class Player:
         from mpgrasp.rerun_recorder import RerunRecorder
 
         return RerunRecorder(self.plan.recordings / f"{task.stem}.rrd")
+
+
+def _real_run_episode() -> RunEpisode:
+    from mpgrasp.episode import run_episode
+
+    return run_episode
 
 
 def play_all(

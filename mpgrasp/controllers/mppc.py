@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.controllers.reaching import ReachingController
-from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap, best_pixel
 from mpgrasp.grid_map import GridMap
 
@@ -35,17 +33,8 @@ class Mppc(ReachingController):
         if grasp is not None:
             self.pool.append(grasp)
 
-    def _attenuation(self, grasp_map: GraspMap) -> float:
-        height = peak_height(grasp_map.quality)
-        exists = height > self.config.peak_threshold
-        self._diagnostics |= {"peak": exists, "peak_height": height}
-        return 1.0 if exists else self.config.alpha
-
-
-def peak_height(quality: FloatArray) -> float:
-    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
-    finite = np.nan_to_num(quality).astype(np.float32)
-    return float(cv2.blur(finite, (3, 3), borderType=cv2.BORDER_REPLICATE).max())
+    def _attenuation(self, peak: bool) -> float:
+        return 1.0 if peak else self.config.alpha
 
 
 def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:

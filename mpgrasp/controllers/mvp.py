@@ -26,5 +26,5 @@ class Mvp(ReachingController):
     def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
         """All that MVP knows is in the grid."""
 
-    def _attenuation(self, grasp_map: GraspMap) -> float:
+    def _attenuation(self, peak: bool) -> float:
         return 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,13 +52,17 @@ class ReachingController(ABC):
         target = self._best_viewpoint(map_of_utility, viewpoint[:2])
         pull = (target - viewpoint[:2]) / config.window
         velocity = config.v_1 * pull / max(1.0, float(np.linalg.norm(pull)))
-        velocity = velocity * self._attenuation(grasp_map)
+        height = peak_height(grasp_map.quality)
+        exists = height > config.peak_threshold
+        velocity = velocity * self._attenuation(exists)
 
         grasp = self.final_grasp()
         yaw_rate = 0.0 if grasp is None else self._yaw_rate(grasp.angle, tcp)
         done = bool(tcp[2, 3] <= config.z_min)
         twist = np.zeros(6) if done else np.array([*velocity, -config.v_z, 0.0, 0.0, yaw_rate])
         self._diagnostics |= {
+            "peak": exists,
+            "peak_height": height,
             "viewpoint_x": float(target[0]),
             "viewpoint_y": float(target[1]),
             "best_quality": 0.0 if grasp is None else grasp.quality,
@@ -75,8 +80,8 @@ class ReachingController(ABC):
         """Take from one view what the grid does not; `cells` (H, W) is -1 where the grid dropped a pixel."""
 
     @abstractmethod
-    def _attenuation(self, grasp_map: GraspMap) -> float:
-        """Factor of the horizontal velocity."""
+    def _attenuation(self, peak: bool) -> float:
+        """Factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
 
     def _evaluate(self, grasp_map: GraspMap, height: float) -> FloatArray:
         """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
@@ -124,3 +129,9 @@ class ReachingController(ABC):
         # within the slack the hand waits at the end of its range; the grasp itself turns the rest
         goal = float(np.clip(goal, -c.yaw_range, c.yaw_range))
         return float(np.clip(c.yaw_gain * (goal - yaw), -c.yaw_rate_max, c.yaw_rate_max))
+
+
+def peak_height(quality: FloatArray) -> float:
+    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
+    finite = np.nan_to_num(quality).astype(np.float32)
+    return float(cv2.blur(finite, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

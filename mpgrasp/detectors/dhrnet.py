@@ -39,19 +39,19 @@ class DHRNetConfig:
 
     channels: int = 1
     """Input channels."""
-    width: int = 16
+    width: int = 24
     """Channels of the finest branch; each coarser one has twice as many."""
     modules: tuple[int, ...] = (1, 1, 1)
     """Modules (parallel residual blocks, then a fuse layer) in the stages of 2, 3 and 4 branches."""
     blocks: int = 2
     """Residual blocks per branch and module."""
-    stem_width: int = 32
+    stem_width: int = 24
     """Channels of the stem and of the first stage."""
     stem_blocks: int = 1
     """Residual blocks of the first stage."""
     bottleneck: bool = False
     """First stage of bottleneck blocks, four times as wide at their ends, instead of plain residual blocks."""
-    head_width: int = 32
+    head_width: int = 24
     """Channels into which the heads take all branches together."""
     fine_head: bool = True
     """Heads at half of the input's resolution, with the stem's features of that resolution beside the branches'

@@ -1,0 +1,310 @@
+"""Execution of a chosen grasp: pre-grasp, guarded descent, close, lift, hold, shake, and the verdict.
+
+The grasp's position is a point on the seen surface. The fingers go as deep as palm and support allow,
+because pads that touch above the widest section squeeze an object down and out. How high an uneven cloth
+lies under the fingers is not known to a millimetre, so they feel for it, and then rise a little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mpgrasp import panda
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.grasp import Grasp
+from mpgrasp.motion import ArmDriver
+from mpgrasp.reflex import Reflex
+from mpgrasp.trajectory import nearest_yaw
+
+PHASES = ("pregrasp", "descend", "close", "lift", "hold", "shake")
+OUTCOMES = ("success", "reflex", "collision", "missed", "slipped")
+"""How an execution can end; the same words as in `Outcome`."""
+
+OnPhase = Callable[[str, ArmDriver], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionConfig:
+    """How a grasp is executed and judged."""
+
+    opening_margin: float = 0.01
+    """Added to the grasp's width before the descent [m]."""
+    approach: float = 0.05
+    """Height of the pre-grasp over the grasp [m]."""
+    approach_speed: float = 0.25
+    """[m/s]"""
+    descent_speed: float = 0.05
+    """[m/s]"""
+    guarded_speed: float = 0.02
+    """Of the last millimetres, where contact with the support is expected [m/s]."""
+    guarded_height: float = 0.010
+    """Height of the finger tips over the table at which those begin [m]."""
+    support_band: float = 0.006
+    """Contact below this height of the tips is with the support, above it with an object [m]; unless the
+    plan itself ends higher."""
+    contact_threshold: float = 3.0
+    """Force that counts as contact [N]."""
+    contact_deceleration: float = 2.0
+    """Braking at contact [m/s2]."""
+    back_off: float = 0.0005
+    """Rise after contact, so that the tips do not press on the support while they close [m]."""
+    palm_depth: float = 0.042
+    """Deepest reach of the tips below the seen surface [m]; the palm is 45 mm above them."""
+    overtravel: float = 0.002
+    """How far below the table's plane the search for contact may go [m]."""
+    grip_force: float = panda.GRIPPER_FORCE_DEFAULT
+    """Of each pad [N]."""
+    settle_time: float = 2.5
+    """Longest wait for the gripper to come to rest [s]."""
+    lift: float = 0.15
+    """[m]"""
+    lift_speed: float = 0.1
+    """[m/s]"""
+    hold_time: float = 1.0
+    """[s]"""
+    shake_amplitude: float = 0.005
+    """[m]"""
+    shake_frequency: float = 3.0
+    """[Hz]; with the amplitude, peaks of 1.8 m/s2."""
+    shake_time: float = 0.7
+    """Of each of the two shakes, sideways and up and down [s]."""
+    settle_after_shake: float = 0.2
+    """[s]"""
+    success_height: float = 0.05
+    """Rise of an object over its place of rest that counts as lifted [m]."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value >= 0):
+                raise ConfigError(f"{name} must be finite and not negative", got=value)
+        for name in ("approach_speed", "descent_speed", "guarded_speed", "lift_speed", "shake_time", "lift"):
+            if getattr(self, name) == 0:
+                raise ConfigError(f"{name} must be positive", got=0)
+        if self.success_height >= self.lift:
+            raise ConfigError("success_height must be less than the lift", got=self.success_height)
+        if not panda.GRIPPER_FORCE_MIN <= self.grip_force <= panda.GRIPPER_FORCE_MAX:
+            raise ConfigError(
+                "grip force out of range",
+                got=self.grip_force,
+                allowed=f"{panda.GRIPPER_FORCE_MIN} to {panda.GRIPPER_FORCE_MAX} N",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionResult:
+    """What came of a grasp."""
+
+    outcome: str
+    """success, reflex, collision, missed or slipped."""
+    reason: str
+    """The same in a sentence."""
+    lifted: str | None = None
+    """The object that was lifted, held and shaken."""
+    between: tuple[str, ...] = ()
+    """Objects that touched both pads when the lift began."""
+    reflex: Reflex | None = None
+    contact_height: float | None = None
+    """Height of the finger tips over the table at first contact [m]; None without contact."""
+    planned_height: float = np.nan
+    """Height of the finger tips over the table that was aimed at [m]."""
+    tip_height: float = np.nan
+    """Height of the finger tips over the table when they closed [m]."""
+    width: float = np.nan
+    """Opening of the gripper when the lift began [m]."""
+    duration: float = 0.0
+    """Simulated time of the whole execution [s]."""
+
+
+def execute_grasp(
+    driver: ArmDriver, grasp: Grasp, config: ExecutionConfig | None = None, on_tick: OnPhase | None = None
+) -> ExecutionResult:
+    """Grasp, lift, hold, shake and judge.
+
+    Args:
+        driver: drives the arm from wherever it is.
+        grasp: what to grasp; its position lies on the seen surface.
+        config: how.
+        on_tick: is told the phase and the driver on every tick of the velocity loop.
+
+    Returns:
+        What came of it. A failed grasp is an outcome, never an exception.
+
+    Raises:
+        ConfigError: a grasp that is not finite.
+    """
+    if not np.all(np.isfinite([*grasp.position, grasp.angle, grasp.width])):
+        raise ConfigError("grasp is not finite", got=(list(grasp.position), grasp.angle, grasp.width))
+    return _Execution(driver, grasp, config or ExecutionConfig(), on_tick).play()
+
+
+class _Execution:
+    def __init__(
+        self, driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, on_tick: OnPhase | None
+    ) -> None:
+        self.driver, self.grasp, self.config, self._on_tick = driver, grasp, config, on_tick
+        self.simulation = driver.simulation
+        self.phase = PHASES[0]
+        self.start = self.simulation.time
+        self.rest = {name: float(self._height(name)) for name in self.simulation.scene.objects}
+        self.yaw = self._choose_yaw()
+        # no deeper than the palm allows, nor than the table
+        self.planned = max(-config.overtravel, float(grasp.position[2]) - config.palm_depth)
+        self.contact_height: float | None = None
+        self.tip_height = np.nan
+        self.between: tuple[str, ...] = ()
+        self.width = np.nan
+
+    def play(self) -> ExecutionResult:
+        for phase, act in (
+            ("pregrasp", self._pregrasp), ("descend", self._descend), ("close", self._close),
+            ("lift", self._lift), ("hold", self._hold), ("shake", self._shake),
+        ):  # fmt: skip
+            self.phase = phase
+            act()
+            if self.driver.reflex is not None:
+                break
+        return replace(
+            self._verdict(),
+            between=self.between,
+            reflex=self.driver.reflex,
+            contact_height=self.contact_height,
+            planned_height=self.planned,
+            tip_height=self.tip_height,
+            width=self.width,
+            duration=self.simulation.time - self.start,
+        )
+
+    # ---- phases
+
+    def _pregrasp(self) -> None:
+        c = self.config
+        self.simulation.open_gripper(min(self.grasp.width + c.opening_margin, panda.GRIPPER_MAX_WIDTH))
+        target = self._pose(float(self.grasp.position[2]) + c.approach)
+        here = self.driver.T_desired
+        if here[2, 3] < target[2, 3] - 1e-3:
+            # up first: the hand may stand between objects
+            retreat = here.copy()
+            retreat[2, 3] = target[2, 3]
+            self._move(retreat, c.approach_speed)
+        self._move(target, c.approach_speed)
+
+    def _descend(self) -> None:
+        c = self.config
+        if self.planned > c.guarded_height:
+            stages = [(self.planned, c.descent_speed)]
+        else:
+            stages = [(c.guarded_height, c.descent_speed), (self.planned, c.guarded_speed)]
+        for tip, speed in stages:
+            target = self._pose(tip + panda.FINGERTIP_BEYOND_TCP)
+            if target[2, 3] >= self.driver.T_desired[2, 3]:
+                continue
+            reached = self._move(target, speed, until=lambda: self.driver.touch > c.contact_threshold)
+            if not reached and self.driver.reflex is None:
+                self._back_off()
+                break
+        self.tip_height = self._tip()
+
+    def _back_off(self) -> None:
+        c = self.config
+        self.contact_height = self._tip()
+        # the desired pose lies below the felt contact by what the servo gave way
+        rest = self.driver.T_desired.copy()
+        rest[2, 3] = max(rest[2, 3], self.contact_height + panda.FINGERTIP_BEYOND_TCP + c.back_off)
+        self._move(rest, c.guarded_speed)
+
+    def _close(self) -> None:
+        c, simulation = self.config, self.simulation
+        simulation.close_gripper(c.grip_force)
+        widths: list[float] = []
+
+        def settled() -> bool:
+            widths.append(simulation.gripper_width)
+            # the grip force builds up within 0.1 s after the pads have met something
+            return len(widths) > 20 and max(widths[-12:]) - min(widths[-12:]) < 1e-4
+
+        self.driver.wait(c.settle_time, self._tick, until=settled)
+        left, right = simulation.pad_contacts()
+        self.between = tuple(sorted(left & right))
+        self.width = simulation.gripper_width
+
+    def _lift(self) -> None:
+        target = self.driver.T_desired.copy()
+        target[2, 3] += self.config.lift
+        self._move(target, self.config.lift_speed)
+
+    def _hold(self) -> None:
+        self.driver.wait(self.config.hold_time, self._tick)
+
+    def _shake(self) -> None:
+        c = self.config
+        R = self.driver.T_desired[:3, :3]
+        # sideways both along and across the closing direction, then up and down
+        for axis in ((R[:, 0] + R[:, 1]) / np.sqrt(2), np.array([0.0, 0.0, 1.0])):
+            self.driver.follow(lambda t, axis=axis: self._swing(t) * axis, c.shake_time, self._tick)  # type: ignore[misc]
+        self.driver.wait(c.settle_after_shake, self._tick)
+
+    def _swing(self, t: float) -> float:
+        """Offset [m] of a shake: an oscillation that swells and fades, at rest at both ends."""
+        c = self.config
+        envelope = np.sin(np.pi * t / c.shake_time) ** 2
+        return float(c.shake_amplitude * envelope * np.sin(2 * np.pi * c.shake_frequency * t))
+
+    # ---- verdict
+
+    def _verdict(self) -> ExecutionResult:
+        c, reflex = self.config, self.driver.reflex
+        if reflex is not None:
+            return ExecutionResult(outcome="reflex", reason=f"{reflex} while in phase {self.phase}")
+        left, right = self.simulation.pad_contacts()
+        for name in sorted(left & right):
+            if self._height(name) - self.rest[name] >= c.success_height:
+                return ExecutionResult(outcome="success", reason=f"{name} is held", lifted=name)
+        if self.between:
+            names = ", ".join(self.between)
+            return ExecutionResult(outcome="slipped", reason=f"{names} was between the pads and was lost")
+        limit = max(c.support_band, self.planned + 0.002)
+        if self.contact_height is not None and self.contact_height > limit:
+            reason = (
+                f"the fingers met something {1e3 * self.contact_height:.1f} mm over the table, "
+                f"planned were {1e3 * max(self.planned, 0.0):.1f} mm"
+            )
+            return ExecutionResult(outcome="collision", reason=reason)
+        return ExecutionResult(outcome="missed", reason="nothing stood between the closed pads")
+
+    # ---- helpers
+
+    def _choose_yaw(self) -> float:
+        """Heading of the hand's x axis: the nearer of the grasp's two, unless only the other is in reach."""
+        T = self.driver.T_desired
+        here = float(np.arctan2(T[1, 0], T[0, 0]))
+        near = nearest_yaw(self.grasp.angle + np.pi / 2, here)
+        for yaw in (near, near - np.copysign(np.pi, near - here)):
+            try:
+                self.driver.ik.solve(self.driver.q, looking_down(self.grasp.position, yaw))
+            except ConfigError:
+                continue
+            return float(yaw)
+        # out of reach either way: go as far as the protective stop allows and let it say why
+        return near
+
+    def _pose(self, z: float) -> FloatArray:
+        return looking_down([self.grasp.position[0], self.grasp.position[1], z], self.yaw)
+
+    def _move(self, target: FloatArray, speed: float, until: Callable[[], bool] | None = None) -> bool:
+        return self.driver.move_to(
+            target, speed, until=until, deceleration=self.config.contact_deceleration, on_tick=self._tick
+        )
+
+    def _tick(self, driver: ArmDriver) -> None:
+        if self._on_tick is not None:
+            self._on_tick(self.phase, driver)
+
+    def _tip(self) -> float:
+        return float(self.simulation.T_world_tcp[2, 3]) - panda.FINGERTIP_BEYOND_TCP
+
+    def _height(self, name: str) -> float:
+        return float(self.simulation.object_pose(name)[2, 3])

@@ -1,0 +1,244 @@
+"""An episode as a small animation and as a strip of stills, for people without the rerun viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from mpgrasp.camera import WristCamera
+from mpgrasp.depth import CameraIntrinsics
+from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.false_colour import shade, shade_depth
+from mpgrasp.geometry import FloatArray, look_at
+from mpgrasp.ray_caster import cast_rays
+from mpgrasp.recording import TickRecord, claim_file
+
+if TYPE_CHECKING:
+    from mpgrasp.simulation import Simulation
+
+Picture = NDArray[np.uint8]
+
+SIZE = (640, 360)
+"""Width and height of a film's pictures [px]."""
+VIEWPOINT = look_at([1.25, -0.80, 0.70], [0.42, 0.0, 0.22], x_axis=(0.8, 0.83, 0.0))
+"""Pose (4, 4) of the camera that watches the scene."""
+
+_VIEW = (352, 312)  # [px], the watching camera's picture
+_PANEL = (144, 138)  # [px]
+_LABEL = 18  # [px], above a panel
+_MARGIN = 0  # [px]
+_INK, _PAPER = (235, 235, 235), (24, 26, 30)
+_FOCAL = 1.15  # of the watching camera, in widths of its picture
+_SUN = np.array([0.35, -0.45, 0.82])
+_SKY = (40, 44, 52)
+_PERIOD = 0.1  # [s] of simulation between pictures
+_LAST = 1.5  # [s] for which the outcome stands still
+_FONT = ImageFont.load_default(13)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmConfig:
+    """How a film is made."""
+
+    backend: str = "auto"
+    """Of the watching camera: "gl", "ray" or "auto", as in `WristCamera`."""
+    max_bytes: int = 3_000_000
+    """A film that gets larger is written again with half of its pictures, at the same speed."""
+    strip_pictures: int = 6
+    """Pictures on the strip."""
+
+    def __post_init__(self) -> None:
+        if self.max_bytes < 1 or self.strip_pictures < 1:
+            raise ConfigError("unusable film settings", got=self, allowed="1 or more bytes and pictures")
+
+
+class FilmRecorder:
+    """Films one episode: the scene, depth, Q, entropy and utility, and a line of text below.
+
+    Args:
+        path: where the film goes; .gif or .webp.
+        strip: where a contact sheet of stills goes, .png; None for none.
+        config: how.
+
+    Raises:
+        OutputError: a file cannot be written.
+        CameraError: backend "gl" without GL.
+    """
+
+    def __init__(
+        self, path: str | Path, strip: str | Path | None = None, config: FilmConfig | None = None
+    ) -> None:
+        self.path = claim_file(path, (".gif", ".webp"))
+        self.strip = None if strip is None else claim_file(strip, (".png",))
+        self.config = config or FilmConfig()
+        self.pictures: list[Picture] = []
+        self.times: list[float] = []
+        self._panels: dict[str, Picture] = {}
+        self._watcher: Watcher | None = None
+        self._caption = ""
+
+    def start(self, simulation: Simulation) -> None:
+        self._watcher = Watcher(simulation.model, self.config.backend)
+
+    def tick(self, record: TickRecord) -> None:
+        self._look_at_maps(record)
+        now = record.simulation.time
+        due = not self.times or now - self.times[-1] >= _PERIOD - 1e-6
+        if not due and record.event is None:
+            return
+        self._caption = f"{record.phase:<9} t = {now:5.2f} s    smallest singular value {record.min_singular_value:.3f}"
+        self._shoot(record.simulation, record.event or "")
+
+    def finish(self, event: str) -> None:
+        """Write the files.
+
+        Raises:
+            OutputError: the disk does not take them.
+        """
+        if self._watcher is not None:
+            self._watcher.close()
+        if not self.pictures:
+            self.pictures.append(_compose(np.zeros((_VIEW[1], _VIEW[0], 3), np.uint8), {}, "", event))
+            self.times.append(0.0)
+        # the outcome under the last view of the world
+        last = self.pictures[-1].copy()
+        _write_caption(last, self._caption, event)
+        self.pictures.append(last)
+        self.times.append(self.times[-1] + _PERIOD)
+        try:
+            self._write_film()
+            if self.strip is not None:
+                chosen = np.linspace(0, len(self.pictures) - 1, self.config.strip_pictures).round().astype(int)
+                filmstrip(self.strip, [self.pictures[k] for k in chosen])
+        except OSError as error:
+            raise OutputError(f"a film cannot be written: {error}", got=str(self.path)) from error
+
+    def _look_at_maps(self, record: TickRecord) -> None:
+        if record.frame is not None:
+            self._panels["depth"] = shade_depth(record.frame.depth)
+        if record.grasp_map is not None:
+            self._panels["Q"] = shade(record.grasp_map.quality, 0.0, 1.0)
+        for name in ("entropy", "utility"):
+            value = record.diagnostics.get(name)
+            if isinstance(value, np.ndarray) and value.ndim == 2:
+                self._panels[name] = shade(value[::-1])  # rows are world y: a view from above
+
+    def _shoot(self, simulation: Simulation, event: str) -> None:
+        assert self._watcher is not None, "tick before start"
+        view = self._watcher.picture(simulation.data)
+        self.pictures.append(_compose(view, self._panels, self._caption, event))
+        self.times.append(simulation.time)
+
+    def _write_film(self) -> None:
+        step = 1
+        while True:
+            # the last picture always stays
+            kept = list(range(len(self.pictures) - 1, -1, -step))[::-1]
+            times = np.array(self.times)[kept]
+            shown = np.append(np.diff(times), _LAST).clip(0.02)
+            write_animation(self.path, [self.pictures[k] for k in kept], shown)
+            if self.path.stat().st_size <= self.config.max_bytes or len(kept) <= 2:
+                return
+            step *= 2
+
+
+class Watcher:
+    """The camera beside the table: drawn by GL where there is one, else by rays."""
+
+    def __init__(self, model: mujoco.MjModel, backend: str = "auto") -> None:
+        self._model = model
+        self._camera = WristCamera(model, backend, None, intrinsics=_view_intrinsics(1.0))
+
+    def picture(self, data: mujoco.MjData, T_world_camera: FloatArray = VIEWPOINT) -> Picture:
+        """Colour picture of the scene as it is now."""
+        if self._camera.backend == "gl":
+            return self._camera.rgb(data, T_world_camera)
+        return self._cast(data, T_world_camera)
+
+    def close(self) -> None:
+        self._camera.close()
+
+    def _cast(self, data: mujoco.MjData, T_world_camera: FloatArray) -> Picture:
+        model = self._model
+        hits = cast_rays(model, data, _view_intrinsics(0.5), T_world_camera)
+        material = model.geom_matid
+        rgba = np.where(material[:, None] >= 0, model.mat_rgba[material], model.geom_rgba) if model.nmat else None
+        colours = (model.geom_rgba if rgba is None else rgba)[:, :3] * 255
+        light = 0.45 + 0.55 * np.clip(hits.normal @ _SUN, 0, 1)
+        picture = colours[hits.geom] * light[..., None]
+        picture[hits.geom < 0] = _SKY
+        return np.asarray(cv2.resize(picture.astype(np.uint8), _VIEW, interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def filmstrip(path: str | Path, pictures: list[Picture], columns: int = 3) -> None:
+    """Write pictures of one size beside and below each other as one PNG."""
+    height, width = pictures[0].shape[:2]
+    rows = -(-len(pictures) // columns)
+    sheet = np.zeros((rows * height, min(columns, len(pictures)) * width, 3), np.uint8)
+    for k, picture in enumerate(pictures):
+        top, left = k // columns * height, k % columns * width
+        sheet[top : top + height, left : left + width] = picture
+    Image.fromarray(sheet).quantize(128).save(path, optimize=True)
+
+
+def write_animation(path: Path, pictures: list[Picture], durations: FloatArray) -> None:
+    """Write pictures as a looping .gif or .webp; durations in seconds."""
+    milliseconds = [int(round(d * 100)) * 10 for d in durations]
+    if path.suffix.lower() == ".webp":
+        images = [Image.fromarray(p) for p in pictures]
+        images[0].save(
+            path, save_all=True, append_images=images[1:], duration=milliseconds, loop=0, quality=70, method=2
+        )
+        return
+    # one palette for all, so that what stands still is stored once
+    samples = pictures[:: max(1, len(pictures) // 8)]
+    palette = Image.fromarray(np.concatenate(samples)).quantize(128, method=Image.Quantize.MEDIANCUT)
+    images = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
+    images[0].save(
+        path, save_all=True, append_images=images[1:], duration=milliseconds, loop=0, disposal=1, optimize=False
+    )
+
+
+def _view_intrinsics(scale: float) -> CameraIntrinsics:
+    width, height = round(_VIEW[0] * scale), round(_VIEW[1] * scale)
+    focal = _FOCAL * width
+    return CameraIntrinsics(
+        fx=focal, fy=focal, cx=(width - 1) / 2, cy=(height - 1) / 2, width=width, height=height
+    )
+
+
+def _compose(view: Picture, panels: dict[str, Picture], caption: str, event: str) -> Picture:
+    canvas = np.full((SIZE[1], SIZE[0], 3), _PAPER, np.uint8)
+    canvas[: _VIEW[1], : _VIEW[0]] = view
+    for k, name in enumerate(("depth", "Q", "entropy", "utility")):
+        left = _VIEW[0] + k % 2 * _PANEL[0]
+        top = k // 2 * (_PANEL[1] + _LABEL)
+        _write(canvas[top : top + _LABEL, left : left + _PANEL[0]], [name])
+        if name in panels:
+            side = min(_PANEL) - 4
+            small = cv2.resize(panels[name], (side, side), interpolation=cv2.INTER_AREA)
+            canvas[top + _LABEL : top + _LABEL + side, left + 4 : left + 4 + side] = small
+    _write_caption(canvas, caption, event)
+    return canvas
+
+
+def _write_caption(canvas: Picture, caption: str, event: str) -> None:
+    strip = canvas[_VIEW[1] :]
+    strip[:] = _PAPER
+    _write(strip, [caption, event])
+
+
+def _write(area: Picture, lines: list[str]) -> None:
+    """Write lines of text into part of a picture, in place."""
+    image = Image.fromarray(area)
+    draw = ImageDraw.Draw(image)
+    for k, line in enumerate(lines):
+        draw.text((8, 2 + 21 * k), line, fill=_INK, font=_FONT)
+    area[:] = np.asarray(image)

@@ -1,0 +1,85 @@
+"""Scenes as files that the plain MuJoCo viewer opens: one XML and a folder of meshes beside it.
+
+    python -m mpgrasp.scene thin --seed 3 --out scene.xml
+    python -m mujoco.viewer --mjcf scene.xml
+
+Key frame "start" holds the settled state with the arm at home.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from mpgrasp.exceptions import MpgraspError, OutputError
+from mpgrasp.scene import Scene, build_scene
+
+
+def save_scene(scene: Scene, path: str | Path) -> list[Path]:
+    """Write the scene as XML with relative references to copies of its mesh files.
+
+    Args:
+        scene: the scene, in its settled state.
+        path: the XML file to write; meshes go into the folder `<stem>_assets` beside it.
+
+    Returns:
+        the files written.
+
+    Raises:
+        OutputError: the XML or the folder cannot be written.
+    """
+    path = Path(path)
+    assets = path.parent / f"{path.stem}_assets"
+    spec = scene.spec.copy()
+    data = scene.data()
+    spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl)
+    written = [path]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        xml = spec.to_xml()
+        for source in {Path(mesh.file) for mesh in spec.meshes if mesh.file}:
+            target = assets / source.name
+            assets.mkdir(exist_ok=True)
+            shutil.copyfile(source, target)
+            xml = xml.replace(f'file="{source}"', f'file="{assets.name}/{target.name}"')
+            written.append(target)
+        path.write_text(xml, encoding="utf-8")
+    except OSError as error:
+        raise OutputError("cannot write the scene", got=str(path), allowed=f"a writable file ({error})") from None
+    return written
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line: write the scene of one benchmark episode; returns the exit code."""
+    parser = _Parser(
+        prog="python -m mpgrasp.scene",
+        description="Write the scene of a benchmark episode as XML for the plain MuJoCo viewer.",
+    )
+    parser.add_argument("suite", metavar="SUITE", help="name of a suite in benchmarks/")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the benchmark run (default 0)")
+    parser.add_argument("--episode", type=int, default=0, help="number of the episode in that run (default 0)")
+    parser.add_argument("--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)")
+    options = parser.parse_args(arguments)
+    try:
+        from mpgrasp.bench.suite import episode_seed, load_suite
+
+        suite = load_suite(options.suite)
+        seed = episode_seed(suite.name, options.seed, options.episode)
+        scene = build_scene(suite.scene_config(options.episode), seed)
+        files = save_scene(scene, options.out)
+    except MpgraspError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    print(f"{options.out}: {', '.join(scene.objects)}; {len(files) - 1} meshes in {options.out.stem}_assets")
+    return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}\n")

@@ -1,0 +1,115 @@
+"""Ramps and profiles: how the velocity of the tool point changes with time, so that no ordinary motion
+trips a protective stop."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, wrap_half_pi
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionConfig:
+    """How briskly the arm moves, and when a singularity is called near."""
+
+    dt: float = 0.01
+    """Period of the velocity loop [s]."""
+    linear_acceleration: float = 1.0
+    """[m/s2]. A reversal of 0.1 m/s then takes 0.25 s and uses less than half of any joint's acceleration
+    within the workspace."""
+    angular_acceleration: float = 4.0
+    """[rad/s2]"""
+    smoothing: int = 5
+    """Ticks over which the ramped velocity is averaged: bounds the jerk at 2 a / (smoothing dt)."""
+    max_speed: float = 0.25
+    """Of pose moves [m/s]."""
+    max_rotation: float = 1.5
+    """Of pose moves [rad/s]."""
+    singularity_warning: float = 0.05
+    """Smallest singular value of the tool Jacobian (m, rad) below which time counts as near a singularity.
+    At the controllers' 0.1 m/s a value of 0.046 = 0.1 / 2.175 is where the worst direction uses up a
+    joint's velocity; the workspace of the paper (0.34 m about x = 0.5) stays above 0.12, and the value
+    falls through 0.05 at 0.76 to 0.79 m from the base, some 2 cm before the arm is stretched."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            "dt", "linear_acceleration", "angular_acceleration", "max_speed", "max_rotation",
+            "singularity_warning",
+        ):  # fmt: skip
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        if self.smoothing < 1:
+            raise ConfigError("smoothing counts ticks", got=self.smoothing, allowed="1 or more")
+
+
+class TwistRamp:
+    """Follows a wanted twist with bounded acceleration and jerk, without overshoot.
+
+    A rate limiter bounds the acceleration; the mean of its last `smoothing` values bounds the jerk and
+    cannot exceed the acceleration of what it averages.
+    """
+
+    def __init__(self, config: MotionConfig | None = None) -> None:
+        self.config = config or MotionConfig()
+        self.reset()
+
+    def reset(self, twist: FloatArray | None = None) -> None:
+        """Start from a constant twist (6,); at rest by default."""
+        start = np.zeros(6) if twist is None else np.array(twist, float)
+        self._limited = start
+        self._recent = deque([start] * self.config.smoothing, maxlen=self.config.smoothing)
+
+    @property
+    def twist(self) -> FloatArray:
+        """The ramped twist (6,) of the last tick [m/s, rad/s]."""
+        return np.mean(self._recent, axis=0)
+
+    def step(self, wanted: FloatArray) -> FloatArray:
+        """The twist (6,) of the next tick on the way to `wanted` (6,)."""
+        c = self.config
+        step = np.asarray(wanted, float) - self._limited
+        for part, bound in ((slice(0, 3), c.linear_acceleration), (slice(3, 6), c.angular_acceleration)):
+            length = float(np.linalg.norm(step[part]))
+            if length > bound * c.dt:
+                step[part] *= bound * c.dt / length
+        self._limited = self._limited + step
+        self._recent.append(self._limited)
+        return self.twist
+
+
+def path_profile(length: float, angle: float, config: MotionConfig, speed: float, rotation: float) -> FloatArray:
+    """Shares of a straight-line move after each tick, (n,), from just above 0 to 1.
+
+    A trapezoid of velocity, smoothed as `TwistRamp` does, that keeps both the linear and the angular
+    bounds of speed and acceleration.
+
+    Args:
+        length: of the move [m].
+        angle: of the move [rad].
+        config: accelerations, period and smoothing.
+        speed: bound [m/s].
+        rotation: bound [rad/s].
+    """
+    if length < 1e-9 and angle < 1e-9:
+        return np.empty(0)
+    v = min(speed / max(length, 1e-9), rotation / max(angle, 1e-9))  # share per second
+    a = min(config.linear_acceleration / max(length, 1e-9), config.angular_acceleration / max(angle, 1e-9))
+    v = min(v, np.sqrt(a))  # a short move is a triangle
+    duration = 1.0 / v + v / a
+    t = np.arange(config.dt, duration + config.dt, config.dt)
+    ramp = np.clip(np.minimum(a * t, a * (duration - t)), 0.0, v)
+    velocity = np.convolve(ramp, np.full(config.smoothing, 1.0 / config.smoothing))
+    share = np.cumsum(velocity)
+    return share / share[-1]
+
+
+def nearest_yaw(angle: float, yaw: float) -> float:
+    """The heading [rad] of grasp line `angle` that lies within 90 degrees of heading `yaw`.
+
+    A grasp is the same after half a turn; the far one sends differential IK the long way round.
+    """
+    return yaw + float(wrap_half_pi(angle - yaw))

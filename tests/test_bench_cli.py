@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fakes
+from mpgrasp.bench.__main__ import main, parse_weights
+from mpgrasp.exceptions import ConfigError
+
+REPOSITORY = Path(__file__).parent.parent
+PLUG_INS = ["--detector", "fakes:FakeDetector", "--controller", "fakes:FakeController"]
+
+
+@pytest.fixture
+def fake_world(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Episodes and world card that take no time."""
+    monkeypatch.setattr("mpgrasp.episode.run_episode", fakes.run_episode)
+    monkeypatch.setattr("mpgrasp.bench.world_card.world_card", lambda *_: {"physics": {}, "camera": {}})
+    return monkeypatch
+
+
+def records(out: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+
+
+def test_a_run_prints_the_table_and_leaves_all_files(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["thin", *PLUG_INS, "--episodes", "5", "--seed", "3", "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    assert "fakes:FakeDetector" in printed.out
+    assert "interval" in printed.out
+    assert printed.err.count("thin episode") == 5
+    lines = records(out)
+    assert [line["episode"] for line in lines] == list(range(5))
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["complete"]
+    assert summary["cells"][0]["successes"] == sum(line["success"] for line in lines)
+    run = json.loads((out / "run.json").read_text())
+    assert run["configuration"]["seed"] == 3
+    assert run["configuration"]["suite"]["scenes"][0]["objects"] == ["usb_stick"]
+    assert run["configuration"]["episode"]["start_jitter"] == 0.05
+    assert run["made_with"]["packages"]["mujoco"]
+
+
+def test_lines_have_all_promised_keys_in_sorted_order(fake_world: object, tmp_path: Path) -> None:
+    main(["thin", *PLUG_INS, "--episodes", "1", "--out", str(tmp_path), "--quiet"])
+    (text,) = (tmp_path / "episodes.jsonl").read_text().splitlines()
+    keys = list(json.loads(text))
+    assert keys == sorted(keys)
+    assert set(keys) >= set(
+        "suite seed episode object detector controller outcome success sim_time_s ticks reflex grasp timing "
+        "min_singular_value path_length_m jerk_rms state_hash".split()
+    )
+
+
+def test_quiet_shows_the_table_alone(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["thin", *PLUG_INS, "--episodes", "2", "--out", str(tmp_path), "--quiet"])
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert "interval" in printed.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["thick"], "unknown suite; got 'thick'; allowed: thin, unseen"),
+        (["absent.toml"], "unreadable suite"),
+        (["thin", "--detector", "resnet"], "unknown detector; got 'resnet'; allowed: dhrnet"),
+        (["thin", "--detector", ""], "unknown detector"),
+        (["thin", "--controller", "mppc,pid"], "unknown controller; got 'pid'; allowed: mppc"),
+        (["thin", *PLUG_INS, "--episodes", "0"], "episodes out of range; got 0"),
+        (["thin", *PLUG_INS, "--episodes", "many"], "invalid int value: 'many'"),
+        (["thin", *PLUG_INS, "--seed", "-1"], "seed out of range; got -1"),
+        (["thin", *PLUG_INS, "--workers", "0"], "workers out of range; got 0"),
+        (["thin", *PLUG_INS, "--record", "-1"], "record out of range"),
+        (["thin", *PLUG_INS, "--camera", "eye"], "unknown camera backend; got 'eye'; allowed: auto, gl, ray"),
+        (["thin", *PLUG_INS, "--weights", "absent.pt"], "no such weights file; got 'absent.pt'"),
+        (["thin", "--detector", "fakes:NotADetector"], "lacks reset, predict"),
+        (["thin", "--frobnicate"], "unrecognized arguments: --frobnicate"),
+        ([], "arguments are required: SUITE"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert main([*arguments, *(["--out", str(tmp_path / "out")] if arguments else [])]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("mpgrasp: error: ")
+    assert printed.err.count("\n") == 1
+    assert message in printed.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("detector", ["dhrnet", "ggcnn"])
+def test_wrong_weights_are_one_line_and_exit_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], detector: str
+) -> None:
+    file = tmp_path / "not-weights.pt"
+    file.write_bytes(b"these are no weights")
+    assert main(["thin", "--detector", detector, "--weights", str(file), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("mpgrasp: error: ")
+    assert error.count("\n") == 1
+
+
+def test_a_directory_of_another_run_is_refused(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["thin", *PLUG_INS, "--episodes", "2", "--out", str(tmp_path), "--quiet"]
+    assert main(common) == 0
+    before = (tmp_path / "episodes.jsonl").read_bytes()
+    assert main([*common, "--seed", "1"]) == 2
+    assert "already holds another run (seed: 0 there, 1 here)" in capsys.readouterr().err
+    assert (tmp_path / "episodes.jsonl").read_bytes() == before
+    assert main(common) == 0
+
+
+def test_a_directory_that_cannot_be_written_is_refused(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["thin", *PLUG_INS, "--out", str(tmp_path / "file" / "run")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_bug_on_the_way_keeps_the_finished_episodes_and_its_traceback(
+    fake_world: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fake_world.setattr("mpgrasp.episode.run_episode", fakes.breaks_off)
+    assert main(["thin", *PLUG_INS, "--out", str(tmp_path), "--quiet"]) == 1
+    assert "ZeroDivisionError: a bug in a detector" in capsys.readouterr().err
+    assert "fakes.py" in (tmp_path / "traceback.txt").read_text()
+    assert len(records(tmp_path)) == 1
+    assert not json.loads((tmp_path / "summary.json").read_text())["complete"]
+
+
+def test_weights_go_to_the_detector_they_name() -> None:
+    assert parse_weights(["a.pt"], ["x"]) == {"x": Path("a.pt")}
+    assert parse_weights(["x=a.pt"], ["x"]) == {"x": Path("a.pt")}
+    assert parse_weights(["y=b=c.pt", "x=a.pt"], ["x", "y"]) == {"x": Path("a.pt"), "y": Path("b=c.pt")}
+    assert parse_weights(["m:C=a.pt"], ["m:C", "y"]) == {"m:C": Path("a.pt")}
+    with pytest.raises(ConfigError, match=r"whose.*x=FILE, y=FILE"):
+        parse_weights(["a.pt"], ["x", "y"])
+    with pytest.raises(ConfigError, match="twice"):
+        parse_weights(["a.pt", "x=b.pt"], ["x"])
+
+
+def test_help_loads_neither_torch_nor_opengl_nor_mujoco() -> None:
+    script = """
+        import sys
+        from mpgrasp.bench.__main__ import main
+        try:
+            main(["--help"])
+        except SystemExit as end:
+            loaded = {name.partition(".")[0] for name in sys.modules}
+            sys.exit(end.code or sorted(loaded & {"torch", "OpenGL", "mujoco", "rerun", "openvino"}) or 0)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], cwd=REPOSITORY, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    for word in ("thin, unseen", "dhrnet", "mppc", "--record", "exit code"):
+        assert word in done.stdout
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path, workers: int) -> None:
+    script = """
+        import sys, time
+        import fakes, mpgrasp.episode, mpgrasp.bench.world_card
+        mpgrasp.bench.world_card.world_card = lambda *_: {}
+        import mpgrasp.bench.runner as runner
+        runner._real_run_episode = lambda: fakes.unhurried
+        original = runner._play_in_processes
+        runner._play_in_processes = lambda p, s, w, r: original(p, s, w, fakes.unhurried)
+        from mpgrasp.bench.__main__ import main
+        if __name__ == "__main__":
+            sys.exit(main(sys.argv[1:]))
+    """
+    (tmp_path / "command.py").write_text(textwrap.dedent(script))
+    out = tmp_path / "out"
+    path = os.pathsep.join([str(REPOSITORY), str(Path(__file__).parent)])
+    command = [
+        sys.executable,
+        str(tmp_path / "command.py"),
+        *["thin", *PLUG_INS, "--episodes", "200", "--out", str(out), "--workers", str(workers)],
+    ]
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    lines = out / "episodes.jsonl"
+    while not (lines.exists() and lines.read_bytes().count(b"\n") >= 3) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the whole group
+    printed, errors = process.communicate(timeout=30)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    kept = records(out)
+    assert 3 <= len(kept) < 200
+    assert [line["episode"] for line in kept] == sorted(line["episode"] for line in kept)
+    summary = json.loads((out / "summary.json").read_text())
+    assert not summary["complete"]
+    assert summary["cells"][0]["n"] == len(kept)
+    assert "fakes:FakeDetector" in printed

@@ -1,0 +1,234 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fakes
+from mpgrasp.bench.plain import difference, one_line, plain
+from mpgrasp.bench.plugins import load_controller, load_detector
+from mpgrasp.bench.run_directory import RunDirectory
+from mpgrasp.bench.runner import EpisodeError, Plan, Player, play_all
+from mpgrasp.bench.suite import episode_seed, load_suite
+from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
+
+DETECTOR, CONTROLLER = "fakes:FakeDetector", "fakes:FakeController"
+
+
+def make_plan(**settings: Any) -> Plan:
+    defaults = {"suite": load_suite("thin"), "detectors": (DETECTOR,), "controllers": (CONTROLLER,)}
+    return Plan(**{**defaults, "episodes": 4, **settings})
+
+
+def lines_of(plan: Plan, run_episode: Any = fakes.run_episode, workers: int = 1) -> list[dict]:
+    lines: list[dict] = []
+    play_all(plan, lines.append, workers=workers, run_episode=run_episode)
+    return lines
+
+
+def without_timing(lines: list[dict]) -> list[str]:
+    return [one_line({key: item for key, item in line.items() if key != "timing"}) for line in lines]
+
+
+def test_lines_say_which_episode_they_are() -> None:
+    line = lines_of(make_plan(seed=7))[2]
+    assert (line["suite"], line["seed"], line["episode"]) == ("thin", 7, 2)
+    assert (line["detector"], line["controller"]) == (DETECTOR, CONTROLLER)
+    assert line["scene_seed"] == episode_seed("thin", 7, 2)
+
+
+def test_every_cell_meets_the_same_scenes() -> None:
+    lines = lines_of(make_plan(controllers=(CONTROLLER, "fakes:OtherController")))
+    assert [line["episode"] for line in lines] == [0, 0, 1, 1, 2, 2, 3, 3]
+    for a, b in zip(lines[::2], lines[1::2], strict=True):
+        assert a["controller"] != b["controller"]
+        assert a["scene_seed"] == b["scene_seed"]
+
+
+def test_two_runs_differ_in_timing_alone() -> None:
+    first, second = lines_of(make_plan()), lines_of(make_plan())
+    assert first != second
+    assert without_timing(first) == without_timing(second)
+
+
+def test_workers_change_neither_lines_nor_their_order() -> None:
+    plan = make_plan(episodes=6)
+    alone = without_timing(lines_of(plan))
+    assert without_timing(lines_of(plan, fakes.slow_first_episode, workers=2)) == alone
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_episode_that_breaks_off_keeps_the_ones_before(workers: int) -> None:
+    lines: list[dict] = []
+    with pytest.raises(EpisodeError, match=r"episode 1 .*ZeroDivisionError: a bug in a detector"):
+        play_all(make_plan(), lines.append, workers=workers, run_episode=fakes.breaks_off)
+    assert [line["episode"] for line in lines] == [0]
+
+
+def test_a_worker_that_dies_ends_the_run_with_an_error() -> None:
+    with pytest.raises(EpisodeError, match="worker process died"):
+        lines_of(make_plan(), fakes.dies, workers=2)
+
+
+def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(
+        textwrap.dedent("""
+        import multiprocessing, os, signal
+        import test_bench_runner as t, fakes
+        def kill(line):
+            print(*[child.pid for child in multiprocessing.active_children()], flush=True)
+            os.kill(os.getpid(), signal.SIGKILL)
+        if __name__ == "__main__":
+            t.play_all(t.make_plan(), kill, workers=2, run_episode=fakes.run_episode)
+        """)
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(Path(__file__).parent)])}
+    done = subprocess.run(
+        [sys.executable, script], env=environment, capture_output=True, text=True, timeout=60
+    )
+    pids = [int(word) for word in done.stdout.split()]
+    assert len(pids) == 2, done.stderr
+    deadline = time.monotonic() + 10
+    while any(_alive(pid) for pid in pids) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(_alive(pid) for pid in pids)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"episodes": 0}, "episodes out of range.*got 0"),
+        ({"seed": -1}, "seed out of range"),
+        ({"record": -1}, "record out of range"),
+        ({"camera": "eye"}, "unknown camera backend.*auto, gl, ray"),
+        ({"detectors": ()}, "list of detectors"),
+        ({"controllers": ("mppc", "mppc")}, "list of controllers"),
+        ({"weights": {"other": Path("x")}}, "does not run"),
+    ],
+)
+def test_impossible_plans_are_refused(settings: dict, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        make_plan(**settings)
+
+
+def test_no_workers_are_refused() -> None:
+    with pytest.raises(ConfigError, match="workers"):
+        lines_of(make_plan(), workers=0)
+
+
+def test_recordings_have_names_that_every_file_system_takes() -> None:
+    assert [task.stem for task in make_plan(episodes=1).tasks()] == [
+        "fakes-FakeDetector-fakes-FakeController-0000"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("resnet", "unknown detector.*'resnet'.*dhrnet.*module:Class"),
+        ("no_such_module:Net", "cannot be imported .ModuleNotFoundError"),
+        ("fakes:Missing", "has no class 'Missing'.*FakeDetector"),
+        ("fakes:NotADetector", "lacks reset, predict"),
+        ("fakes:FailsToStart", "RuntimeError: no licence"),
+    ],
+)
+def test_unusable_detectors_are_refused(name: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        load_detector(name)
+
+
+def test_unusable_controllers_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"unknown controller.*mppc, mvp, open_loop"):
+        load_controller("pid")
+    with pytest.raises(ConfigError, match="lacks update, final_grasp, diagnostics"):
+        load_controller(DETECTOR)
+
+
+def test_plug_ins_get_their_weights(tmp_path: Path) -> None:
+    file = tmp_path / "net.pt"
+    file.write_bytes(b"x")
+    player = Player(make_plan(weights={DETECTOR: file}), fakes.run_episode)
+    assert player.detectors[DETECTOR].weights == file  # type: ignore[attr-defined]
+    with pytest.raises(WeightsError, match="no such weights file"):
+        load_detector(DETECTOR, tmp_path / "absent.pt")
+
+
+def test_a_run_directory_holds_every_line_at_once(tmp_path: Path) -> None:
+    directory = RunDirectory.create(tmp_path / "a" / "b", {"configuration": {"seed": 0}})
+    for k in range(3):
+        directory.append({"episode": k, "x": np.float64(1 / 3), "nan": float("nan")})
+        assert len(directory.episodes_file.read_bytes().splitlines()) == k + 1
+    assert directory.episodes()[0] == {"episode": 0, "x": 0.333333333, "nan": None}
+    directory.write_summary([{"n": 3}], complete=True)
+    assert json.loads((directory.path / "summary.json").read_text()) == {
+        "complete": True,
+        "cells": [{"n": 3}],
+    }
+
+
+def test_a_directory_with_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
+    RunDirectory.create(tmp_path, {"configuration": {"seed": 0}}).append({"episode": 0})
+    before = {path: path.read_bytes() for path in tmp_path.glob("*.json*")}
+    with pytest.raises(OutputError, match=r"another run \(seed: 0 there, 1 here\)"):
+        RunDirectory.create(tmp_path, {"configuration": {"seed": 1}})
+    assert {path: path.read_bytes() for path in tmp_path.glob("*.json*")} == before
+
+
+def test_the_same_run_again_starts_afresh_and_keeps_the_old_lines(tmp_path: Path) -> None:
+    run = {"configuration": {"seed": 0}}
+    RunDirectory.create(tmp_path, run).append({"episode": 0})
+    again = RunDirectory.create(tmp_path, run)
+    assert again.episodes() == []
+    assert (tmp_path / "episodes.previous.jsonl").read_text() == '{"episode": 0}\n'
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", "not json"])
+def test_a_directory_with_an_unreadable_run_is_refused(tmp_path: Path, content: str) -> None:
+    (tmp_path / "run.json").write_text(content)
+    with pytest.raises(OutputError, match=r"run\.json cannot be read"):
+        RunDirectory.create(tmp_path, {"configuration": {}})
+
+
+def test_a_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written"):
+        RunDirectory.create(tmp_path / "file", {"configuration": {}})
+    with pytest.raises(OutputError, match="cannot be written"):
+        RunDirectory.create(tmp_path / "file" / "below", {"configuration": {}})
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_an_output_error(tmp_path: Path) -> None:
+    directory = RunDirectory.create(tmp_path, {"configuration": {}})
+    directory._episodes = os.open("/dev/full", os.O_WRONLY)
+    with pytest.raises(OutputError, match="No space left"):
+        directory.append({"episode": 0})
+
+
+def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:
+    value = {"a": (1, np.int64(2)), "b": np.array([0.1 + 0.2]), "p": Path("x"), "o": object(), "s": {3, 1}}
+    assert plain(value) == {"a": [1, 2], "b": [0.3], "p": "x", "o": "builtins.object", "s": [1, 3]}
+    assert json.loads(json.dumps(plain(make_plan())))["suite"]["scenes"][0]["objects"] == ["usb_stick"]
+
+
+def test_the_first_difference_is_named_by_its_path() -> None:
+    a = {"x": {"y": [1, 2]}, "z": 1}
+    assert difference(a, a) is None
+    assert difference(a, {"x": {"y": [1, 3]}, "z": 1}) == "x.y: [1, 2] there, [1, 3] here"
+    assert difference(a, {"x": {"y": [1, 2]}, "z": 1, "w": 0}) == "w: null there, 0 here"

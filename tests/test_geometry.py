@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from mpgrasp.geometry import (
+    invert,
+    line_angle_difference,
+    look_at,
+    looking_down,
+    rotation_vector,
+    rotation_x,
+    rotation_z,
+    transform,
+    transform_points,
+    wrap_half_pi,
+    wrap_pi,
+)
+
+
+def _random_pose(rng: np.random.Generator) -> np.ndarray:
+    R = rotation_z(rng.uniform(-3, 3)) @ rotation_x(rng.uniform(-3, 3)) @ rotation_z(rng.uniform(-3, 3))
+    return transform(R, rng.standard_normal(3))
+
+
+def test_inverse_undoes_a_transform() -> None:
+    rng = np.random.default_rng(0)
+    T = _random_pose(rng)
+    points = rng.standard_normal((4, 5, 3))
+    np.testing.assert_allclose(transform_points(invert(T), transform_points(T, points)), points, atol=1e-12)
+    np.testing.assert_allclose(invert(T), np.linalg.inv(T), atol=1e-12)
+
+
+@pytest.mark.parametrize("yaw", [-2.5, 0.0, 0.4])
+def test_looking_down_points_its_z_axis_at_the_floor(yaw: float) -> None:
+    T = looking_down([1, 2, 3], yaw)
+    np.testing.assert_allclose(T[:3, 2], [0, 0, -1], atol=1e-12)
+    np.testing.assert_allclose(T[:3, 0], [np.cos(yaw), np.sin(yaw), 0], atol=1e-12)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+
+
+def test_look_at_sees_its_target_on_the_optical_axis() -> None:
+    T = look_at([0.3, -0.2, 0.6], [0.5, 0.1, 0.0], x_axis=(0, 1, 0))
+    in_camera = transform_points(invert(T), np.array([0.5, 0.1, 0.0]))
+    np.testing.assert_allclose(in_camera[:2], 0, atol=1e-12)
+    assert in_camera[2] > 0
+    assert T[1, 0] > 0.9
+    np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-12)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+
+
+def test_look_at_straight_down_is_looking_down() -> None:
+    np.testing.assert_allclose(look_at([1, 2, 3], [1, 2, 0]), looking_down([1, 2, 3]), atol=1e-12)
+
+
+def test_folding_keeps_the_line_or_the_direction_and_the_range() -> None:
+    angles = np.concatenate(
+        [np.linspace(-20, 20, 1001), [np.pi / 2, -np.pi / 2, np.pi, -1e-17, -np.pi / 2 - 1e-17]]
+    )
+    half, full = wrap_half_pi(angles), wrap_pi(angles)
+    assert ((half >= -np.pi / 2) & (half < np.pi / 2)).all()
+    assert ((full >= -np.pi) & (full < np.pi)).all()
+    np.testing.assert_allclose(np.exp(2j * half), np.exp(2j * angles), atol=1e-12)
+    np.testing.assert_allclose(np.exp(1j * full), np.exp(1j * angles), atol=1e-12)
+
+
+def test_lines_half_a_turn_apart_do_not_differ() -> None:
+    assert line_angle_difference(0.1, 0.1 + np.pi) == pytest.approx(0, abs=1e-12)
+    assert line_angle_difference(1.5, -1.5) == pytest.approx(np.pi - 3)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-4, 1.0, 3.1, np.pi])
+def test_rotation_vector_is_axis_times_angle(angle: float) -> None:
+    turned = _random_pose(np.random.default_rng(3))[:3, :3]
+    R = turned @ rotation_z(angle) @ turned.T
+    vector = rotation_vector(R)
+    assert np.linalg.norm(vector) == pytest.approx(angle, abs=1e-9)
+    if angle > 1e-6:
+        axis = vector / np.linalg.norm(vector)
+        assert abs(axis @ turned[:, 2]) == pytest.approx(1, abs=1e-6)
+        if angle < np.pi:
+            assert axis @ turned[:, 2] > 0

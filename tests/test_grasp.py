@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mpgrasp.depth import CameraIntrinsics
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import line_angle_difference, looking_down
+from mpgrasp.grasp import (
+    Grasp,
+    GraspMap,
+    GraspRectangle,
+    best_pixel,
+    image_to_world_angle,
+    peaks,
+    world_to_image_angle,
+)
+
+YAWS = [0.0, 0.7, -2.1]
+WIDE = CameraIntrinsics(fx=210.0, fy=230.0, cx=70.0, cy=40.0, width=131, height=97)
+
+
+def random_map(yaw: float, rng: np.random.Generator) -> GraspMap:
+    shape = (WIDE.height, WIDE.width)
+
+    def draw(low: float, high: float) -> np.ndarray:
+        return rng.uniform(low, high, shape).astype(np.float32)
+
+    return GraspMap(
+        quality=draw(0, 1),
+        angle=draw(-np.pi / 2, np.pi / 2),
+        width=draw(5, 60),
+        depth=draw(0.25, 0.6),
+        intrinsics=WIDE,
+        T_world_camera=looking_down([0.5, -0.1, 0.6], yaw),
+    )
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_image_angle_agrees_with_two_points_along_the_closing_direction(yaw: float) -> None:
+    """Oracle: deproject two pixels that lie on the line and take the heading between them."""
+    T = looking_down([0.4, 0.2, 0.5], yaw)
+    for angle in np.linspace(-np.pi / 2, np.pi / 2, 11):
+        pixels = np.array([[0.0, 0.0], [np.cos(angle), -np.sin(angle)]]) * 30 + [60, 50]
+        square = CameraIntrinsics(fx=200, fy=200, cx=64, cy=48, width=128, height=96)
+        points = square.deproject(pixels[:, 0], pixels[:, 1], np.full(2, 0.5)) @ T[:3, :3].T
+        dx, dy, _ = points[1] - points[0]
+        assert line_angle_difference(image_to_world_angle(angle, T), np.arctan2(dy, dx)) < 1e-9
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_turning_the_camera_turns_the_world_angle_by_as_much(yaw: float) -> None:
+    straight = image_to_world_angle(0.3, looking_down([0, 0, 1]))
+    turned = image_to_world_angle(0.3, looking_down([0, 0, 1], yaw))
+    assert line_angle_difference(turned, straight + yaw) < 1e-9
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_mirroring_the_image_angle_mirrors_the_world_angle_about_the_camera_heading(yaw: float) -> None:
+    T = looking_down([0, 0, 1], yaw)
+    for angle in (0.2, 0.9, -1.3):
+        left, right = image_to_world_angle(angle, T), image_to_world_angle(-angle, T)
+        assert line_angle_difference((left - yaw), -(right - yaw)) < 1e-9
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_world_angle_to_image_and_back_is_the_same_line(yaw: float) -> None:
+    T = looking_down([0.1, 0.2, 0.4], yaw)
+    angles = np.linspace(-1.5, 1.5, 23)
+    assert (
+        line_angle_difference(image_to_world_angle(world_to_image_angle(angles, T), T), angles).max() < 1e-9
+    )
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_grasp_to_rectangle_and_back_is_the_same_grasp_on_a_non_square_image(yaw: float) -> None:
+    view = random_map(yaw, np.random.default_rng(0))
+    for row, col in [(0, 0), (96, 130), (13, 101), (70, 5)]:
+        grasp = view.grasp_at(row, col)
+        back = view.grasp_of(view.rectangle_of(grasp))
+        np.testing.assert_allclose(back.position, grasp.position, atol=1e-9)
+        assert line_angle_difference(back.angle, grasp.angle) < 1e-9
+        assert back.width == pytest.approx(grasp.width)
+        assert back.quality == grasp.quality
+
+
+@pytest.mark.parametrize("yaw", YAWS)
+def test_the_grasp_of_a_pixel_agrees_with_the_maps_of_the_whole_image(yaw: float) -> None:
+    view = random_map(yaw, np.random.default_rng(1))
+    points, angles, widths = view.world_points(), view.world_angle(), view.world_width()
+    for row, col in [(0, 130), (50, 60), (96, 0)]:
+        grasp = view.grasp_at(row, col)
+        np.testing.assert_allclose(grasp.position, points[row, col], atol=1e-6)
+        assert line_angle_difference(grasp.angle, angles[row, col]) < 1e-5
+        assert grasp.width == pytest.approx(widths[row, col], rel=1e-5)
+
+
+def test_the_grasp_frame_closes_along_the_grasp_angle_and_approaches_downwards() -> None:
+    for angle in (-1.2, 0.0, 0.4):
+        T = Grasp(position=np.array([0.4, 0.1, 0.02]), angle=angle, width=0.05, quality=1).T_world_grasp()
+        np.testing.assert_allclose(T[:3, 1], [np.cos(angle), np.sin(angle), 0], atol=1e-12)
+        np.testing.assert_allclose(T[:3, 2], [0, 0, -1], atol=1e-12)
+        np.testing.assert_allclose(np.cross(T[:3, 1], T[:3, 2]), T[:3, 0], atol=1e-12)
+
+
+def test_a_map_of_the_wrong_size_is_refused() -> None:
+    view = random_map(0.0, np.random.default_rng(2))
+    with pytest.raises(ConfigError, match="quality"):
+        GraspMap(
+            quality=view.quality.T,
+            angle=view.angle,
+            width=view.width,
+            depth=view.depth,
+            intrinsics=WIDE,
+            T_world_camera=view.T_world_camera,
+        )
+
+
+def test_rectangle_corners_and_back_is_the_same_rectangle() -> None:
+    for angle in (-1.5, -0.3, 0.0, 1.2):
+        rectangle = GraspRectangle(u=40, v=-3, angle=angle, width_px=30, jaw_px=11)
+        back = GraspRectangle.from_corners(rectangle.corners())
+        assert (back.u, back.v) == pytest.approx((40, -3))
+        assert (back.width_px, back.jaw_px) == pytest.approx((30, 11))
+        assert line_angle_difference(back.angle, angle) < 1e-9
+
+
+def test_rectangle_tilts_counter_clockwise_on_screen() -> None:
+    first, second, *_ = GraspRectangle(u=0, v=0, angle=np.pi / 4, width_px=10, jaw_px=2).corners()
+    du, dv = second - first
+    assert du > 0
+    assert dv < 0  # up on screen
+
+
+def test_iou_agrees_with_counting_points() -> None:
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-30, 30, (200_000, 2))
+
+    def inside(r: GraspRectangle) -> np.ndarray:
+        d = points - [r.u, r.v]
+        along = d @ [np.cos(r.angle), -np.sin(r.angle)]
+        across = d @ [np.sin(r.angle), np.cos(r.angle)]
+        return (abs(along) < r.width_px / 2) & (abs(across) < r.jaw_px / 2)
+
+    for _ in range(5):
+        a, b = (
+            GraspRectangle(
+                u=rng.uniform(-5, 5),
+                v=rng.uniform(-5, 5),
+                angle=rng.uniform(-1.5, 1.5),
+                width_px=rng.uniform(10, 25),
+                jaw_px=rng.uniform(5, 15),
+            )
+            for _ in range(2)
+        )
+        expected = (inside(a) & inside(b)).sum() / (inside(a) | inside(b)).sum()
+        assert a.iou(b) == pytest.approx(expected, abs=0.02)
+        assert a.iou(b) == pytest.approx(b.iou(a), abs=1e-5)
+
+
+def test_iou_is_one_with_itself_after_half_a_turn_and_zero_apart_or_without_area() -> None:
+    a = GraspRectangle(u=1000, v=2000, angle=0.4, width_px=20, jaw_px=8)
+    turned = GraspRectangle.from_corners(np.roll(a.corners(), 2, axis=0))
+    assert a.iou(turned) == pytest.approx(1, abs=1e-4)
+    assert a.iou(GraspRectangle(u=1100, v=2000, angle=0.4, width_px=20, jaw_px=8)) == 0
+    assert a.iou(GraspRectangle(u=1000, v=2000, angle=0.4, width_px=20, jaw_px=0)) == 0
+
+
+def test_corners_that_are_not_numbers_are_refused() -> None:
+    with pytest.raises(ConfigError):
+        GraspRectangle.from_corners(np.full((4, 2), np.nan))
+
+
+def test_best_pixel_is_the_argmax_and_the_middle_of_a_flat_top() -> None:
+    rng = np.random.default_rng(4)
+    quality = rng.random((40, 61)).astype(np.float32)
+    assert best_pixel(quality) == np.unravel_index(np.argmax(quality), quality.shape)
+    quality[10:21, 30:51] = 1.0
+    assert best_pixel(quality)[0] == 15
+    quality[15, 40] = np.nan
+    assert best_pixel(quality) != (15, 40)
+
+
+def test_peaks_find_every_bump_once_best_first() -> None:
+    v, u = np.mgrid[:90, :130]
+    bumps = [(20, 30, 0.9), (70, 100, 0.6), (40, 110, 0.75), (60, 20, 0.05)]
+    quality = sum(q * np.exp(-((v - r) ** 2 + (u - c) ** 2) / 50) for r, c, q in bumps)
+    assert peaks(quality, threshold=0.1, distance=8).tolist() == [[20, 30], [40, 110], [70, 100]]
+    assert peaks(quality, threshold=0.1, distance=8, count=1).tolist() == [[20, 30]]
+    assert peaks(quality, threshold=0.1, distance=60).tolist() == [[20, 30], [40, 110]]
+
+
+def test_peaks_of_an_empty_map_are_none_and_of_a_flat_top_are_one() -> None:
+    assert peaks(np.zeros((20, 30))).shape == (0, 2)
+    flat = np.zeros((40, 40))
+    flat[10:15, 10:15] = 1
+    assert len(peaks(flat, distance=10)) == 1

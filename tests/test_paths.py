@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from mpgrasp import paths
+
+REPOSITORY = Path(__file__).parent.parent
+
+
+@pytest.mark.parametrize("name", ["PANDA_ASSETS", "OBJECT_ASSETS", "WEIGHTS", "SCENES", "BENCHMARKS"])
+def test_every_data_folder_is_there_and_not_empty(name: str) -> None:
+    folder: Path = getattr(paths, name)
+    assert folder.is_dir()
+    assert any(folder.iterdir())
+
+
+def test_a_wheel_carries_all_that_the_checkout_offers(tmp_path: Path) -> None:
+    pytest.importorskip("hatchling")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=REPOSITORY,
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        archive.extractall(tmp_path / "site")
+    files = {f"mpgrasp/_data/benchmarks/{file.name}" for file in (REPOSITORY / "benchmarks").glob("*.toml")}
+    files |= {"mpgrasp/_data/scenes/table.xml", "mpgrasp/_data/assets/objects/objects.toml"}
+    assert files <= names
+    assert not any("__pycache__" in name or name.startswith("tests/") for name in names)
+    # the unpacked wheel finds its own data, far from the checkout
+    listed = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "from mpgrasp.bench.suite import suite_names as s; from mpgrasp.paths import *;"
+            "print(DATA_ROOT, *s(), sep='|')",
+        ],
+        cwd=tmp_path / "site",
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    root, *suites = listed.split("|")
+    assert Path(root) == tmp_path / "site" / "mpgrasp" / "_data"
+    assert {"thin", "unseen"} <= set(suites)
