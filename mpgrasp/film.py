@@ -93,7 +93,9 @@ class FilmRecorder:
         due = not self.times or now - self.times[-1] >= _PERIOD - 1e-6
         if not due and record.event is None:
             return
-        self._caption = f"{record.phase:<9} t = {now:5.2f} s    smallest singular value {record.min_singular_value:.3f}"
+        self._caption = (
+            f"{record.phase:<9} t = {now:5.2f} s    smallest singular value {record.min_singular_value:.3f}"
+        )
         self._shoot(record.simulation, record.event or "")
 
     def finish(self, event: str) -> None:
@@ -115,7 +117,9 @@ class FilmRecorder:
         try:
             self._write_film()
             if self.strip is not None:
-                chosen = np.linspace(0, len(self.pictures) - 1, self.config.strip_pictures).round().astype(int)
+                chosen = (
+                    np.linspace(0, len(self.pictures) - 1, self.config.strip_pictures).round().astype(int)
+                )
                 filmstrip(self.strip, [self.pictures[k] for k in chosen])
         except OSError as error:
             raise OutputError(f"a film cannot be written: {error}", got=str(self.path)) from error
@@ -139,8 +143,8 @@ class FilmRecorder:
     def _write_film(self) -> None:
         step = 1
         while True:
-            # the last picture always stays
-            kept = list(range(len(self.pictures) - 1, -1, -step))[::-1]
+            # the first and the last picture always stay
+            kept = sorted({0, *range(len(self.pictures) - 1, -1, -step)})
             times = np.array(self.times)[kept]
             shown = np.append(np.diff(times), _LAST).clip(0.02)
             write_animation(self.path, [self.pictures[k] for k in kept], shown)
@@ -169,12 +173,18 @@ class Watcher:
         model = self._model
         hits = cast_rays(model, data, _view_intrinsics(0.5), T_world_camera)
         material = model.geom_matid
-        rgba = np.where(material[:, None] >= 0, model.mat_rgba[material], model.geom_rgba) if model.nmat else None
+        rgba = (
+            np.where(material[:, None] >= 0, model.mat_rgba[material], model.geom_rgba)
+            if model.nmat
+            else None
+        )
         colours = (model.geom_rgba if rgba is None else rgba)[:, :3] * 255
         light = 0.45 + 0.55 * np.clip(hits.normal @ _SUN, 0, 1)
         picture = colours[hits.geom] * light[..., None]
         picture[hits.geom < 0] = _SKY
-        return np.asarray(cv2.resize(picture.astype(np.uint8), _VIEW, interpolation=cv2.INTER_LINEAR), np.uint8)
+        return np.asarray(
+            cv2.resize(picture.astype(np.uint8), _VIEW, interpolation=cv2.INTER_LINEAR), np.uint8
+        )
 
 
 def filmstrip(path: str | Path, pictures: list[Picture], columns: int = 3) -> None:
@@ -202,7 +212,13 @@ def write_animation(path: Path, pictures: list[Picture], durations: FloatArray) 
     palette = Image.fromarray(np.concatenate(samples)).quantize(128, method=Image.Quantize.MEDIANCUT)
     images = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=milliseconds, loop=0, disposal=1, optimize=False
+        path,
+        save_all=True,
+        append_images=images[1:],
+        duration=milliseconds,
+        loop=0,
+        disposal=1,
+        optimize=False,
     )
 
 

@@ -49,6 +49,7 @@ class RerunRecorder:
         self._stream.save(self.path, default_blueprint=_blueprint())
         self._scene: RerunModel | None = None
         self._phase: str | None = None
+        self._event: str | None = None
 
     def start(self, simulation: Simulation) -> None:
         log = self._stream.log
@@ -63,20 +64,22 @@ class RerunRecorder:
 
     def tick(self, record: TickRecord) -> None:
         log, simulation = self._stream.log, record.simulation
+        if record.frame is not None:  # what was seen, and thought of it, belongs to the exposure
+            self._stream.set_time(TIMELINE, duration=record.frame.time)
+            self._log_frame(record.frame)
+        if record.grasp_map is not None:
+            self._log_maps(record.grasp_map)
+        for name, value in record.diagnostics.items():
+            self._log_diagnostic(name, value)
         self._stream.set_time(TIMELINE, duration=simulation.time)
         if self._scene is not None:
             self._scene.log_poses(simulation.data)
         if record.phase != self._phase:
             log("events", rr.TextLog(f"phase: {record.phase}", level="INFO"))
             self._phase = record.phase
-        if record.event is not None:
+        if record.event is not None and record.event != self._event:
             log("events", rr.TextLog(record.event, level="WARN"))
-        if record.frame is not None:
-            self._log_frame(record.frame)
-        if record.grasp_map is not None:
-            self._log_maps(record.grasp_map)
-        for name, value in record.diagnostics.items():
-            self._log_diagnostic(name, value)
+        self._event = record.event
         for kind, twist in (("commanded", record.twist_commanded), ("achieved", record.twist_achieved)):
             log(f"twist/linear/{kind}", rr.Scalars(twist[:3]))
             log(f"twist/angular/{kind}", rr.Scalars(twist[3:]))

@@ -46,6 +46,8 @@ class Snapshot:
     """Force of each pad while grasping [N]; None while the gripper holds a width."""
     width_target: float
     """Commanded opening [m]."""
+    contact_torque: FloatArray
+    """(7,) that contacts caused at the joints, mean over the last `step` [N m]."""
 
 
 class Simulation:
@@ -77,18 +79,18 @@ class Simulation:
         panda.set_home(self.model, self.data)
         self._grip_force: float | None = None
         self._width_target = panda.GRIPPER_MAX_WIDTH
-        self._mean_external_force = np.zeros(3)
+        self._contact_torque = np.zeros(7)
         self.set_q(panda.Q_HOME)
 
     def step(self, n: int = 1) -> None:
         """Advance by n time steps."""
-        total = np.zeros(3)
+        torque = np.zeros(7)
         for _ in range(n):
             self._drive_arm()
             self._drive_gripper()
             mujoco.mj_step(self.model, self.data)
-            total += self._external_force()
-        self._mean_external_force = total / max(n, 1)
+            torque += self._arm_constraint
+        self._contact_torque = torque / max(n, 1)
         mujoco.mj_forward(self.model, self.data)
 
     # ---- arm --------------------------------------------------------------------------------------------------
@@ -217,25 +219,18 @@ class Simulation:
 
     @property
     def external_force(self) -> FloatArray:
-        """Net contact force (3,) on the robot [N], world axes, as a mean over the last `step`.
+        """Net contact force (3,) on the tool [N], world axes, as a mean over the last `step`.
 
-        The forces of both pads on a held object cancel, as they do in the estimate of a real arm. One
-        instant says little: hard contacts hit for a millisecond with hundreds of newtons.
+        Found as a real arm finds it, from the torques that contacts cause at the joints: the forces of both
+        pads on a held object cancel. One instant says little, because a hard contact hits for a millisecond
+        with hundreds of newtons.
         """
-        return self._mean_external_force.copy()
-
-    def _external_force(self) -> FloatArray:
-        total = np.zeros(3)
-        geom = self.data.contact.geom
-        if not len(geom):
-            return total
-        robot = self._owner[geom] == _ROBOT
-        for i in np.flatnonzero(robot.sum(axis=1) == 1):
-            mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
-            # rows of the contact frame are its axes; the force acts from the first geom on the second
-            force = self._wrench[:3] @ self.data.contact.frame[i].reshape(3, 3)
-            total += force if robot[i, 1] else -force
-        return total
+        if not self._contact_torque.any():
+            return np.zeros(3)
+        J = np.empty((6, self.model.nv))
+        mujoco.mj_jacSite(self.model, self.data, J[:3], J[3:], self._tcp)
+        wrench, *_ = np.linalg.lstsq(J[:, self._dofs].T, self._contact_torque, rcond=1e-3)
+        return wrench[:3]
 
     def object_pose(self, name: str) -> FloatArray:
         """Pose (4, 4) of an object's body frame in the world.
@@ -280,6 +275,7 @@ class Simulation:
             ramp_steps=self._ramp_steps,
             grip_force=self._grip_force,
             width_target=self._width_target,
+            contact_torque=self._contact_torque.copy(),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -290,6 +286,7 @@ class Simulation:
         self._ramp_steps = snapshot.ramp_steps
         self._grip_force = snapshot.grip_force
         self._width_target = snapshot.width_target
+        self._contact_torque = snapshot.contact_torque.copy()
         mujoco.mj_forward(self.model, self.data)
 
     def _state(self) -> FloatArray:
@@ -315,6 +312,7 @@ class Simulation:
         self._finger_qpos = self.data.qpos[finger.qposadr[0] : finger.qposadr[0] + 2]
         self._arm_ctrl = self.data.ctrl[arm : arm + 7]
         self._gripper_ctrl = self.data.ctrl[gripper : gripper + 1]
+        self._arm_constraint = self.data.qfrc_constraint[self._dofs]
         self._dt = float(model.opt.timestep)
         self._gripper_stiffness = float(model.actuator_gainprm[gripper, 0])
         gain, bias = model.actuator_gainprm[arm : arm + 7], model.actuator_biasprm[arm : arm + 7]

@@ -56,7 +56,7 @@ class HandGeometry:
     """Height of the straight tip [m]."""
     max_opening: float = 0.080
     """Widest opening between the pads [m]."""
-    max_contact_width: float = 0.073
+    max_contact_width: float = 0.072
     """Widest thing to close on, so that both fingers still pass beside it [m]."""
     reach: float = 0.042
     """How far the tips go below the surface point before the palm comes near [m]."""
@@ -66,8 +66,10 @@ class HandGeometry:
     """The palm along and across the closing direction [m]."""
     tip_clearance: float = 0.0005
     """Height of the tips over what they stop on [m]."""
-    margin: tuple[float, float] = (0.003, 0.008)
+    margin: tuple[float, float] = (0.005, 0.008)
     """Least and wanted free space between object and open pad, on each side [m]."""
+    opening_margin: float = 0.010
+    """What the execution adds to a grasp's width, both sides together [m]; at most twice the least margin."""
     min_depth: float = 0.0012
     """Least height of the contacts above the tips [m]."""
     friction_angle: float = np.deg2rad(25.0)
@@ -82,6 +84,10 @@ class HandGeometry:
             )
         if not 0 <= self.margin[0] < self.margin[1]:
             raise ConfigError("margins out of order", got=self.margin, allowed="(least, wanted), least first")
+        if not 0 <= self.opening_margin <= 2 * self.margin[0]:
+            raise ConfigError(
+                "unusable opening margin", got=self.opening_margin, allowed=f"0 to {2 * self.margin[0]}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +99,7 @@ class WorldGrasps:
     angle: Float32
     """(ny, nx) closing direction about world z [rad], in [-pi/2, pi/2)."""
     width: Float32
-    """(ny, nx) opening before the fingers close [m]."""
+    """(ny, nx) what to close on and a margin; the execution adds its own to it [m]."""
     height_map: HeightMap
     """The grid and scene that the arrays belong to."""
 
@@ -238,6 +244,7 @@ class _TurnedView:
                 np.ones((self.finger, 1), np.uint8),
             )
             margin = np.minimum(margin, self._free(tall > 0, r, a, b) - hand.shaft_thickness)
+        room = margin - 0.5 * cell >= np.minimum(hand.margin[0], (hand.max_opening - run) / 2)
         margin = np.minimum(np.minimum(margin - 0.5 * cell, (hand.max_opening - run) / 2), hand.margin[1])
         # where the tips stop: on what lies under the open fingers, or where the palm forbids to go on
         reach = np.rint((margin + hand.finger_thickness / 2) / cell).astype(int)
@@ -245,7 +252,7 @@ class _TurnedView:
         landing = np.maximum(self.under_finger[r, left], self.under_finger[r, right]) + hand.tip_clearance
         wanted = np.maximum(self.height[r, c] - hand.reach, 0)
         tip = np.maximum(wanted, landing)
-        good = margin >= hand.margin[0]
+        good = room
         if on_cloth:
             good &= wanted < landing + LEVEL_STEP / 2
             lands = np.zeros(len(r), bool)
@@ -267,13 +274,13 @@ class _TurnedView:
         slant = self.finger * cell * np.abs(np.tan(np.clip(edges.turn, -half_bin, half_bin)))
         q *= _bell(np.maximum(run - slant - edges.run, 0) / 2 / UNEVENNESS_TOLERANCE)
         q *= _bell((c - edges.middle) * cell / OFFSET_TOLERANCE)
-        q *= np.clip(0.5 + 0.5 * (margin - hand.margin[0]) / (0.7 * (hand.margin[1] - hand.margin[0])), 0, 1)
+        q *= np.clip(0.5 + 0.5 * (margin - 0.004) / 0.003, 0, 1)
         mass = self.masses[most[r, a].astype(int)]
         arm = np.hypot(c - mass[:, 0], r - mass[:, 1]) * cell
         q *= 0.3 + 0.7 * _bell(arm / ARM_TOLERANCE)
 
         better = q > result[r, c, 0]
-        opening = np.minimum(run - slant + 2 * margin, hand.max_opening)
+        opening = np.minimum(run - slant + 2 * margin, hand.max_opening) - hand.opening_margin
         result[r[better], c[better]] = np.column_stack([q, opening, edges.turn])[better]
 
     def _runs(self, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
