@@ -85,7 +85,8 @@ def play(ticks: int, camera_backend: str, seed: int) -> tuple[Stopwatch, list[An
     from mpgrasp.scene import build_scene
     from mpgrasp.simulation import Simulation
 
-    watch, frames = Stopwatch(), []
+    watch = Stopwatch()
+    frames: list[Any] = []
     watch.wrap(sensor_noise, "apply", "noise")
     watch.wrap(GridMap, "update", "grid map")
     suite = load_suite("thin")

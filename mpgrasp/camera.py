@@ -19,7 +19,7 @@ from mpgrasp import sensor_noise
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.rasteriser import Rasteriser, gl_context
+from mpgrasp.rasteriser import Rasteriser, require_gl
 from mpgrasp.ray_caster import ray_cast
 from mpgrasp.sensor_noise import DepthNoise
 
@@ -138,7 +138,7 @@ class WristCamera:
 def _gl_usable(backend: str) -> bool:
     """Whether GL works here; under "gl" it must, under "auto" the log says once that it does not."""
     if backend == "gl":
-        gl_context()
+        require_gl()
         return True
     return _gl_or_notice()
 
@@ -146,7 +146,7 @@ def _gl_usable(backend: str) -> bool:
 @functools.cache
 def _gl_or_notice() -> bool:
     try:
-        gl_context()
+        require_gl()
     except CameraError as error:
         _log.warning("no OpenGL here, so the camera casts rays instead (same images, slower): %s", error)
         return False

@@ -48,7 +48,7 @@ class ExecutionConfig:
     plan itself ends higher."""
     contact_threshold: float = 3.0
     """Force that counts as contact [N]."""
-    contact_deceleration: float = 2.0
+    contact_deceleration: float = 1.0
     """Braking at contact [m/s2]."""
     back_off: float = 0.0005
     """Rise after contact, so that the tips do not press on the support while they close [m]."""

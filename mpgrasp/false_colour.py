@@ -30,7 +30,7 @@ def shade(values: FloatArray, low: float | None = None, high: float | None = Non
 
 
 def shade_lines(angle: FloatArray, weight: FloatArray) -> NDArray[np.uint8]:
-    """Picture (H, W, 3) of the angles of lines [rad]: hue once around in half a turn, faded by weight in [0, 1]."""
+    """Picture (H, W, 3) of the angles of lines [rad]: hue goes round in half a turn, faded by weight."""
     finite = np.isfinite(angle)
     wheel = _colour(np.mod(np.where(finite, angle, 0) / np.pi, 1.0), finite, _CYCLIC)
     return np.asarray(wheel * np.clip(weight, 0.15, 1.0)[..., None], np.uint8)

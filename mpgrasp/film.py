@@ -27,13 +27,12 @@ Picture = NDArray[np.uint8]
 
 SIZE = (640, 360)
 """Width and height of a film's pictures [px]."""
-VIEWPOINT = look_at([1.25, -0.80, 0.70], [0.42, 0.0, 0.22], x_axis=(0.8, 0.83, 0.0))
+VIEWPOINT = look_at([1.40, -0.95, 0.85], [0.38, 0.02, 0.27], x_axis=(0.97, 1.02, 0.0))
 """Pose (4, 4) of the camera that watches the scene."""
 
 _VIEW = (352, 312)  # [px], the watching camera's picture
 _PANEL = (144, 138)  # [px]
 _LABEL = 18  # [px], above a panel
-_MARGIN = 0  # [px]
 _INK, _PAPER = (235, 235, 235), (24, 26, 30)
 _FOCAL = 1.15  # of the watching camera, in widths of its picture
 _SUN = np.array([0.35, -0.45, 0.82])
@@ -163,7 +162,9 @@ class Watcher:
     def picture(self, data: mujoco.MjData, T_world_camera: FloatArray = VIEWPOINT) -> Picture:
         """Colour picture of the scene as it is now."""
         if self._camera.backend == "gl":
-            return self._camera.rgb(data, T_world_camera)
+            picture = self._camera.rgb(data, T_world_camera)
+            picture[(picture == 0).all(axis=-1)] = _SKY  # where GL drew nothing
+            return picture
         return self._cast(data, T_world_camera)
 
     def close(self) -> None:
@@ -195,12 +196,12 @@ def filmstrip(path: str | Path, pictures: list[Picture], columns: int = 3) -> No
     for k, picture in enumerate(pictures):
         top, left = k // columns * height, k % columns * width
         sheet[top : top + height, left : left + width] = picture
-    Image.fromarray(sheet).quantize(128).save(path, optimize=True)
+    Image.fromarray(sheet).quantize(256).save(path, optimize=True)
 
 
 def write_animation(path: Path, pictures: list[Picture], durations: FloatArray) -> None:
     """Write pictures as a looping .gif or .webp; durations in seconds."""
-    milliseconds = [int(round(d * 100)) * 10 for d in durations]
+    milliseconds = [10 * round(d * 100) for d in durations.tolist()]
     if path.suffix.lower() == ".webp":
         images = [Image.fromarray(p) for p in pictures]
         images[0].save(
@@ -209,7 +210,7 @@ def write_animation(path: Path, pictures: list[Picture], durations: FloatArray) 
         return
     # one palette for all, so that what stands still is stored once
     samples = pictures[:: max(1, len(pictures) // 8)]
-    palette = Image.fromarray(np.concatenate(samples)).quantize(128, method=Image.Quantize.MEDIANCUT)
+    palette = Image.fromarray(np.concatenate(samples)).quantize(200, method=Image.Quantize.MEDIANCUT)
     images = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     images[0].save(
         path,

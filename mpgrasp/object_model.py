@@ -48,7 +48,7 @@ class Part:
     shape: str
     """box, cylinder, capsule, ellipsoid or mesh."""
     size: tuple[float, ...] = ()
-    """Half sizes as in MuJoCo [m]: box and ellipsoid (x, y, z); cylinder and capsule (radius, half length)."""
+    """Half sizes [m] as in MuJoCo: box, ellipsoid (x, y, z); cylinder, capsule (radius, half length)."""
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """[m]"""
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -67,9 +67,11 @@ class Part:
                 allowed=f"{_SIZES[self.shape]} positive lengths [m]",
             )
         if self.shape == "mesh":
-            vertices = np.asarray(self.vertices if self.vertices is not None else [], float).reshape(-1, 3)
+            vertices = np.asarray([] if self.vertices is None else self.vertices, float).reshape(-1, 3)
             if len(vertices) < 4 or not np.isfinite(vertices).all():
-                raise AssetError("mesh is empty", got=f"{len(vertices)} vertices", allowed="at least 4, finite")
+                raise AssetError(
+                    "mesh is empty", got=f"{len(vertices)} vertices", allowed="at least 4, all finite"
+                )
             object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "size", size)
 
@@ -86,7 +88,7 @@ class Part:
 
     @cached_property
     def volume(self) -> float:
-        """[m^3]"""
+        """Volume [m^3]."""
         s = self.size
         if self.shape == "box":
             return 8 * s[0] * s[1] * s[2]
@@ -114,7 +116,7 @@ class Part:
             return np.vstack([np.column_stack([ring, np.full(24, z)]) for z in (-s[1], s[1])])
         if self.shape == "capsule":
             ball = _SPHERE * s[0]
-            return np.vstack([ball + (0, 0, s[1]), ball - (0, 0, s[1])])
+            return np.vstack([ball + np.array([0, 0, z]) for z in (-s[1], s[1])])
         return _SPHERE * s
 
 
@@ -143,7 +145,7 @@ class ObjectModel:
     """Sliding friction coefficient against everything: cloth, pads (an object's contacts are its own)."""
     rgba: tuple[float, float, float, float] = (0.75, 0.75, 0.75, 1.0)
     rolls: bool = False
-    """Give all parts friction against rolling; parts that are cylinders, capsules or ellipsoids always have it."""
+    """All parts have friction against rolling; cylinders, capsules and ellipsoids have it anyway."""
     provenance: str = ""
     """Where shape and mass come from."""
 
@@ -224,7 +226,9 @@ def add_object(
         if part.shape == "mesh":
             assert part.vertices is not None
             spec.add_mesh(
-                name=f"{name}/{k}", uservert=part.vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+                name=f"{name}/{k}",
+                uservert=part.vertices.ravel(),
+                inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
             )
             geom.meshname = f"{name}/{k}"
         else:

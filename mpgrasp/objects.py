@@ -41,7 +41,7 @@ OBJECT_SETS: dict[str, tuple[str, ...]] = {
         "banana",
         "screwdriver",
         "tape_roll",
-        "box",
+        "carton",
         "brush",
         "bowl",
     ),
@@ -66,9 +66,8 @@ def load_object(name: str) -> ObjectModel:
     try:
         parts = [_part(part) for part in declaration.get("parts", [])]
         if "mesh" in declaration:
-            parts += [
-                Part(shape="mesh", vertices=piece) for piece in read_pieces(OBJECT_ASSETS / declaration["mesh"])
-            ]
+            pieces = read_pieces(OBJECT_ASSETS / declaration["mesh"])
+            parts += [Part(shape="mesh", vertices=piece) for piece in pieces]
         return ObjectModel(
             name=name,
             parts=tuple(parts),
@@ -134,11 +133,17 @@ def convex_pieces(mesh: Any, threshold: float = 0.08) -> list[FloatArray]:
         import coacd
     except ImportError:
         raise AssetError(
-            "mesh is not convex", got=f"{mesh.volume / hull.volume:.0%} of its hull", allowed="install coacd"
+            "mesh is not convex",
+            got=f"{mesh.volume / hull.volume:.0%} of its hull",
+            allowed="pip install mpgrasp[assets]",
         ) from None
     coacd.set_log_level("error")
     cut = coacd.run_coacd(
-        coacd.Mesh(mesh.vertices, mesh.faces), threshold=threshold, max_convex_hull=16, seed=0, resolution=1000
+        coacd.Mesh(mesh.vertices, mesh.faces),
+        threshold=threshold,
+        max_convex_hull=16,
+        resolution=1000,
+        seed=0,
     )
     return [np.asarray(vertices) for vertices, _ in cut]
 
@@ -168,8 +173,12 @@ def read_pieces(path: Path) -> list[FloatArray]:
 
 def _load_mesh(path: Path) -> list[Any]:
     """Connected pieces of a mesh file as `trimesh.Trimesh`, checked for emptiness and size."""
-    import trimesh
-
+    try:
+        import trimesh
+    except ImportError:
+        raise AssetError(
+            "cannot read mesh files", got=str(path), allowed="pip install mpgrasp[assets]"
+        ) from None
     try:
         mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # each file type fails in its own way

@@ -1,7 +1,7 @@
 """The Franka Emika Robot (FER, "Panda") with hand and wrist camera: model, limits and poses.
 
-References: limits from https://frankaemika.github.io/docs/control_parameters.html (limits for Panda); those in current
-libfranka are the FR3's and differ. Frames and inertials from franka_description, by way of example-robot-data.
+Limits are those for Panda in https://frankaemika.github.io/docs/control_parameters.html; the constants in
+current libfranka are the FR3's and differ. Frames, inertials and meshes come from franka_description.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def arm_model() -> mujoco.MjModel:
         spec.delete(element)
     for name, joint, side in zip(("left_finger", "right_finger"), FINGER_JOINTS, (1, -1), strict=True):
         finger = spec.body(name)
-        finger.pos = finger.pos + [0.0, side * GRIPPER_MAX_WIDTH / 2, 0.0]
+        finger.pos[1] += side * GRIPPER_MAX_WIDTH / 2
         spec.delete(spec.joint(joint))
     spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.01])
     return spec.compile()
@@ -153,7 +153,11 @@ def collision_pairs(model: mujoco.MjModel) -> list[tuple[list[str], list[str]]]:
         ConfigError: a model with other names.
     """
     tool, fingers = ["hand", "camera_housing"], ["left_pad", "right_pad"]
-    pairs = [(tool, ["table"]), ([*tool, *fingers], ["link0", "link1", "link2"]), (["camera_housing"], ["link5"])]
+    pairs = [
+        (tool, ["table"]),
+        ([*tool, *fingers], ["link0", "link1", "link2"]),
+        (["camera_housing"], ["link5"]),
+    ]
     missing = {name for pair in pairs for group in pair for name in group} - {
         model.geom(i).name for i in range(model.ngeom)
     }

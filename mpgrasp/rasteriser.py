@@ -27,22 +27,49 @@ NEAR = 0.02
 FAR = 5.0
 """Whatever is farther than this z-depth is not seen [m]."""
 
-_MAX_GEOMS = 10_000
+_SPARE_GEOMS = 100
 _CATEGORIES = mujoco.mjtCatBit.mjCAT_STATIC.value | mujoco.mjtCatBit.mjCAT_DYNAMIC.value
 _SHADOW_MAP = 1024
 _COLOUR_SAMPLES = 4
 _SLICES = 64
 
 
-@functools.cache
-def gl_context() -> Any:
-    """The process's one off-screen GL context; EGL on Linux unless `MUJOCO_GL` asks for another.
-
-    Start worker processes with "spawn": a context does not survive a fork.
+def require_gl() -> None:
+    """Make sure that GL works; it is tried once in a process.
 
     Raises:
         CameraError: there is no GL on this machine.
     """
+    error = _gl_error()
+    if error is not None:
+        raise error
+
+
+@functools.cache
+def _gl_error() -> CameraError | None:
+    try:
+        context = _new_gl_context()
+    except CameraError as error:
+        return error
+    try:
+        # glfw without a display only complains: what counts is whether MuJoCo can draw
+        mujoco.MjrContext(mujoco.MjSpec().compile(), mujoco.mjtFontScale.mjFONTSCALE_50.value).free()
+    except Exception as error:
+        return _no_gl(error)
+    finally:
+        context.free()
+    return None
+
+
+def _no_gl(error: Exception) -> CameraError:
+    return CameraError(
+        f"OpenGL cannot be initialised: {type(error).__name__}: {error}",
+        allowed='a machine with EGL (libegl1 and a driver such as Mesa), or backend "ray" without GL',
+    )
+
+
+def _new_gl_context() -> Any:
+    """A current off-screen GL context; EGL on Linux unless `MUJOCO_GL` asks for another."""
     try:
         if platform.system() == "Linux" and not os.environ.get("MUJOCO_GL"):
             # mujoco picks glfw by itself, which needs a display
@@ -52,10 +79,7 @@ def gl_context() -> Any:
         context = GLContext(64, 64)
         context.make_current()
     except Exception as error:  # each platform's binding raises types of its own
-        raise CameraError(
-            f"OpenGL cannot be initialised: {type(error).__name__}: {error}",
-            allowed='a machine with EGL (libegl1 and a driver such as Mesa), or backend "ray" without GL',
-        ) from error
+        raise _no_gl(error) from error
     return context
 
 
@@ -112,14 +136,15 @@ class Rasteriser:
         self._model = model
         self._intrinsics = intrinsics
         self._colour = colour
-        gl_context().make_current()
+        # A GL context of its own: two MuJoCo contexts in one GL context draw into each other's buffers.
+        self._gl = _new_gl_context()
         with _visual_settings(model, intrinsics.width, intrinsics.height, colour):
             self._context: mujoco.MjrContext | None = mujoco.MjrContext(
                 model, mujoco.mjtFontScale.mjFONTSCALE_50.value
             )
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._scene = mujoco.MjvScene(model, maxgeom=_MAX_GEOMS)
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + _SPARE_GEOMS)
         self._rect = mujoco.MjrRect(0, 0, intrinsics.width, intrinsics.height)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = [group in geom_groups for group in range(mujoco.mjNGROUP)]
@@ -139,7 +164,7 @@ class Rasteriser:
         """
         if self._context is None:
             raise CameraError("the camera was closed", allowed="a new camera")
-        gl_context().make_current()
+        self._gl.make_current()
         mujoco.mjv_updateScene(
             self._model, data, self._option, None, self._free_camera, _CATEGORIES, self._scene
         )
@@ -173,8 +198,14 @@ class Rasteriser:
         """Free the GL resources; the object is of no use afterwards."""
         context, self._context = self._context, None
         if context is not None:
-            gl_context().make_current()
+            self._gl.make_current()
             context.free()
+            self._gl.free()
+
+    def __del__(self) -> None:
+        # MuJoCo's context has to be freed under its own GL context; at exit that may be gone already
+        with contextlib.suppress(Exception):
+            self.close()
 
 
 def _z_depth(buffer: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -53,7 +53,7 @@ class RerunModel:
         rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
         colour = np.asarray(np.clip(rgba, 0, 1) * 255, np.uint8)
         kind, size = model.geom_type[geom], model.geom_size[geom]
-        solid = {"colors": [colour], "fill_mode": "solid"}
+        solid: dict[str, Any] = {"colors": [colour], "fill_mode": "solid"}
         if colour[3] == 0 or kind == kinds.mjGEOM_PLANE:
             return None  # an endless floor would dwarf everything else
         if kind == kinds.mjGEOM_BOX:

@@ -35,9 +35,9 @@ _AXES = ("x", "y", "z")
 class RerunRecorder:
     """Writes one episode to an .rrd file.
 
-    Entities: `world` (robot, objects, arena, camera with its depth image, chosen grasp), `maps` (quality, angle,
-    width), `grid` (entropy, utility and the controller's other grids, seen from above, world x to the right),
-    `twist`, `arm`, `controller` (its scalars) and `events`, all over the timeline `sim_time`.
+    Entities: `world` (robot, objects, arena, camera with its depth image, chosen grasp), `maps` (quality,
+    angle, width), `grid` (entropy, utility and the controller's other grids, seen from above, world x to the
+    right), `twist`, `arm`, `controller` (its scalars) and `events`, all over the timeline `sim_time`.
 
     Raises:
         OutputError: the file cannot be written.

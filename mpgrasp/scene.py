@@ -56,7 +56,9 @@ class SceneConfig:
         for name in ("objects", "centre"):  # declarations give lists
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.count is not None and not 1 <= self.count <= len(self.objects):
-            raise ConfigError("unusable count of objects", got=self.count, allowed=f"1 to {len(self.objects)}, or none")
+            raise ConfigError(
+                "unusable count of objects", got=self.count, allowed=f"1 to {len(self.objects)}"
+            )
         _one_of("placing", self.placing, ("scatter", "pile"))
         _one_of("pose", self.pose, ("upright", "random"))
         if len(self.centre) != 2 or not np.isfinite(self.centre).all():
@@ -114,7 +116,8 @@ class Scene:
             if distance >= 0 and _SKY - distance > height[row, col]:
                 height[row, col] = _SKY - distance
                 label[row, col] = mine[self.model.geom_bodyid[hit[0]]]
-        return HeightMap(height=height, support=support, label=label, x0=float(x[0]), y0=float(y[0]), cell=cell)
+        x0, y0 = float(x[0]), float(y[0])
+        return HeightMap(height=height, support=support, label=label, x0=x0, y0=y0, cell=cell)
 
     def _body_names(self) -> list[str]:
         return [self.model.body(k).name for k in range(self.model.nbody)]

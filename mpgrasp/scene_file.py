@@ -41,7 +41,7 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         xml = spec.to_xml()
-        for source in {Path(mesh.file) for mesh in spec.meshes if mesh.file}:
+        for source in sorted({Path(mesh.file) for mesh in spec.meshes if mesh.file}):
             target = assets / source.name
             assets.mkdir(exist_ok=True)
             shutil.copyfile(source, target)
@@ -49,7 +49,9 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
             written.append(target)
         path.write_text(xml, encoding="utf-8")
     except OSError as error:
-        raise OutputError("cannot write the scene", got=str(path), allowed=f"a writable file ({error})") from None
+        raise OutputError(
+            "cannot write the scene", got=str(path), allowed=f"a writable file ({error})"
+        ) from None
     return written
 
 
@@ -61,8 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("suite", metavar="SUITE", help="name of a suite in benchmarks/")
     parser.add_argument("--seed", type=int, default=0, help="seed of the benchmark run (default 0)")
-    parser.add_argument("--episode", type=int, default=0, help="number of the episode in that run (default 0)")
-    parser.add_argument("--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)")
+    parser.add_argument(
+        "--episode", type=int, default=0, help="number of the episode in that run (default 0)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)"
+    )
     options = parser.parse_args(arguments)
     try:
         from mpgrasp.bench.suite import episode_seed, load_suite

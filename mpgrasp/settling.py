@@ -12,6 +12,7 @@ from typing import Literal
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
@@ -78,13 +79,13 @@ class Settler:
             stray = (away > self.half_extent + REGION_TOLERANCE) | ~self._still()
             if calm and not stray.any():
                 return self.data.qpos[self._qpos[:, None] + np.arange(7)].copy()
-            for k in np.flatnonzero(stray):
-                self._dropped[k] = False
-            for k in np.flatnonzero(stray):
+            again = [int(k) for k in np.flatnonzero(stray)]
+            self._dropped[again] = False
+            for k in again:
                 self._drop(k, self._pile_spot() if pile else self._free_spot(k))
         raise ConfigError(
             "objects do not come to rest within the placing region",
-            got=[self.names[k] for k in np.flatnonzero(stray)],
+            got=[self.names[k] for k in again],
             allowed="a larger region, fewer objects or a flatter cloth",
         )
 
@@ -93,8 +94,8 @@ class Settler:
         quaternion = self._orientation()
         points = self.objects[k].points @ rotation_of(quaternion).T
         radius = float(np.linalg.norm(points[:, :2], axis=1).max())
-        ground = self.cloth.highest(*spot, radius)
-        for j in np.flatnonzero(self._dropped):
+        ground = self.cloth.highest(float(spot[0]), float(spot[1]), radius)
+        for j in map(int, np.flatnonzero(self._dropped)):
             pose = self._pose(j)
             if np.linalg.norm(pose[:2] - spot) < radius + self._radius[j]:
                 top = (self.objects[j].points @ rotation_of(pose[3:]).T)[:, 2].max()
@@ -137,7 +138,7 @@ class Settler:
     def _pose(self, k: int) -> FloatArray:
         return self.data.qpos[self._qpos[k] : self._qpos[k] + 7]
 
-    def _still(self) -> FloatArray:
+    def _still(self) -> NDArray[np.bool_]:
         """(n,) whether each object is at rest."""
         v = np.abs(self.data.qvel[self._dof[:, None] + np.arange(6)])
         return (v[:, :3].max(axis=1) < STILL_SPEED) & (v[:, 3:].max(axis=1) < STILL_RATE)

@@ -1,7 +1,7 @@
 """The running world: time, motion targets, contacts and state of one scene.
 
-Between two calls everything in `data` belongs to the same instant: `step` ends with a forward pass, because MuJoCo's own
-step leaves poses and contacts one time step behind the joint positions.
+Between two calls everything in `data` belongs to the same instant: `step` ends with a forward pass,
+because MuJoCo's own step leaves poses and contacts one time step behind the joint positions.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mpgrasp import panda
+from mpgrasp.contacts import Contacts
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
 
@@ -23,18 +25,13 @@ if TYPE_CHECKING:
 SERVO_PERIOD = 0.01
 """Time in which the arm's reference runs up to a commanded position, the period of the velocity loop [s]."""
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_ELSEWHERE = -1
-_ROBOT = -2
-_PAD_FACE_COSINE = 0.5
-"""A pad is touched by its face if the contact normal is within 60 degrees of the closing direction: wider than any
-friction cone here, and blind to what a tip stands on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Snapshot:
     """Everything that decides the future of a simulation."""
 
-    state: FloatArray
+    state: NDArray[np.float64]
     """MuJoCo's integration state."""
     q_target: FloatArray
     """(7,) [rad]"""
@@ -62,10 +59,8 @@ class Simulation:
         self.model: mujoco.MjModel = scene.model
         self.data = mujoco.MjData(self.model)
         self._index_robot()
-        self._index_owners()
+        self._contacts = Contacts(self.model, self.data, scene.objects)
         self.reset()
-
-    # ---- time -------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -79,7 +74,7 @@ class Simulation:
         panda.set_home(self.model, self.data)
         self._grip_force: float | None = None
         self._width_target = panda.GRIPPER_MAX_WIDTH
-        self._contact_torque = np.zeros(7)
+        self._contact_torque: FloatArray = np.zeros(7)
         self.set_q(panda.Q_HOME)
 
     def step(self, n: int = 1) -> None:
@@ -92,8 +87,6 @@ class Simulation:
             torque += self._arm_constraint
         self._contact_torque = torque / max(n, 1)
         mujoco.mj_forward(self.model, self.data)
-
-    # ---- arm --------------------------------------------------------------------------------------------------
 
     @property
     def q(self) -> FloatArray:
@@ -113,9 +106,7 @@ class Simulation:
     @property
     def T_world_tcp(self) -> FloatArray:
         """Pose (4, 4) of the tool point."""
-        return transform(
-            self.data.site_xmat[self._tcp].reshape(3, 3), self.data.site_xpos[self._tcp]
-        )
+        return transform(self.data.site_xmat[self._tcp].reshape(3, 3), self.data.site_xpos[self._tcp])
 
     @property
     def twist_tcp(self) -> FloatArray:
@@ -130,8 +121,8 @@ class Simulation:
         """Teleport the arm to q (7,) [rad] at rest and hold it there; for the start of an episode only."""
         self.data.qpos[self._qpos] = q
         self.data.qvel[self._dofs] = 0.0
-        self._q_target = np.array(q, float)
-        self._dq_target = np.zeros(7)
+        self._q_target: FloatArray = np.array(q, float)
+        self._dq_target: FloatArray = np.zeros(7)
         self._ramp_steps = 0
         mujoco.mj_forward(self.model, self.data)
 
@@ -152,9 +143,9 @@ class Simulation:
             return
         self._ramp_steps -= 1
         # The servo damps against standstill; its lead, kv / kp, makes it damp against dq instead.
-        self._arm_ctrl[:] = self._q_target + self._dq_target * (self._servo_lead - self._ramp_steps * self._dt)
-
-    # ---- gripper ----------------------------------------------------------------------------------------------
+        self._arm_ctrl[:] = self._q_target + self._dq_target * (
+            self._servo_lead - self._ramp_steps * self._dt
+        )
 
     @property
     def gripper_width(self) -> float:
@@ -162,7 +153,7 @@ class Simulation:
         return float(self._finger_qpos[0] + self._finger_qpos[1])
 
     def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
-        """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at what the hand can do."""
+        """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at the hand's limits."""
         self._grip_force = None
         self._width_target = float(np.clip(width, 0.0, panda.GRIPPER_MAX_WIDTH))
 
@@ -186,36 +177,22 @@ class Simulation:
             limit = panda.GRIPPER_SPEED * self._dt
             reference += min(max(self._width_target - reference, -limit), limit)
         else:
-            # The servo pulls with its stiffness times the lag: never let it lag by more than the force asked for.
+            # The servo pulls with its stiffness times the lag: let it lag by the force asked for.
             floor = self.gripper_width - self._grip_force / self._gripper_stiffness
             reference = max(reference - panda.GRIPPER_CLOSE_SPEED * self._dt, floor)
         self._gripper_ctrl[0] = reference
 
-    # ---- contacts and objects ---------------------------------------------------------------------------------
-
     def pad_contacts(self) -> tuple[set[str], set[str]]:
         """Names of the objects that press against the face of the left and of the right pad."""
-        left: set[str] = set()
-        right: set[str] = set()
-        geom = self.data.contact.geom  # (ncon, 2)
-        if not len(geom):
-            return left, right
-        pads, owners = self._pad_side[geom], self._owner[geom]  # (ncon, 2) each
-        for i in np.flatnonzero(pads.any(axis=1) & (owners >= 0).any(axis=1)):
-            closing = self.data.site_xmat[self._tcp].reshape(3, 3)[:, 1]
-            if abs(self.data.contact.frame[i, :3] @ closing) < _PAD_FACE_COSINE or not self._normal_force(i):
-                continue
-            side = left if pads[i].max() == 1 else right
-            side.add(self.scene.objects[owners[i].max()])
-        return left, right
+        return self._contacts.pads()
 
     def contact_force(self) -> float:
         """Largest normal force [N] of one part of the robot against one thing that is not the robot."""
-        return self._largest_force(self._owner == _ROBOT)
+        return self._contacts.robot_force()
 
     def finger_contact_force(self) -> float:
         """The same for the hand, the camera and the fingers only [N]."""
-        return self._largest_force(self._is_hand)
+        return self._contacts.hand_force()
 
     @property
     def external_force(self) -> FloatArray:
@@ -242,25 +219,6 @@ class Simulation:
             raise ConfigError("unknown object", got=name, allowed=self.scene.objects)
         body = self.data.body(name)
         return transform(body.xmat.reshape(3, 3), body.xpos)
-
-    def _largest_force(self, part: np.ndarray) -> float:
-        geom = self.data.contact.geom
-        if not len(geom):
-            return 0.0
-        robot = self._owner[geom] == _ROBOT
-        relevant = np.flatnonzero(part[geom].any(axis=1) & (robot.sum(axis=1) == 1))
-        # Several contact points between two geoms share the load.
-        sums: dict[tuple[int, int], float] = {}
-        for i in relevant:
-            pair = (int(geom[i, 0]), int(geom[i, 1]))
-            sums[pair] = sums.get(pair, 0.0) + self._normal_force(i)
-        return max(sums.values(), default=0.0)
-
-    def _normal_force(self, contact: int) -> float:
-        mujoco.mj_contactForce(self.model, self.data, contact, self._wrench)
-        return float(self._wrench[0])
-
-    # ---- state ------------------------------------------------------------------------------------------------
 
     def state_hash(self) -> str:
         """SHA-256 (hex) of the integration state."""
@@ -289,24 +247,28 @@ class Simulation:
         self._contact_torque = snapshot.contact_torque.copy()
         mujoco.mj_forward(self.model, self.data)
 
-    def _state(self) -> FloatArray:
+    def _state(self) -> NDArray[np.float64]:
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return state
 
-    # ---- indices ----------------------------------------------------------------------------------------------
-
     def _index_robot(self) -> None:
         model, prefix = self.model, panda.PREFIX
         try:
-            first, finger = model.joint(prefix + panda.ARM_JOINTS[0]), model.joint(prefix + panda.FINGER_JOINTS[0])
-            arm, gripper = model.actuator(prefix + panda.ARM_JOINTS[0]).id, model.actuator(prefix + "gripper").id
+            first, finger = (
+                model.joint(prefix + panda.ARM_JOINTS[0]),
+                model.joint(prefix + panda.FINGER_JOINTS[0]),
+            )
+            arm, gripper = (
+                model.actuator(prefix + panda.ARM_JOINTS[0]).id,
+                model.actuator(prefix + "gripper").id,
+            )
             self._tcp = model.site(prefix + "tcp").id
         except KeyError as error:
             raise ConfigError(
                 "the scene has no robot", got=str(error), allowed="build_scene(..., robot=True)"
             ) from error
-        # Joints and actuators of one robot follow one another; slices give views, which are quick to write to.
+        # Joints and actuators of one robot follow one another; slices give views, quick to write to.
         self._qpos = slice(first.qposadr[0], first.qposadr[0] + 7)
         self._dofs = slice(first.dofadr[0], first.dofadr[0] + 7)
         self._finger_qpos = self.data.qpos[finger.qposadr[0] : finger.qposadr[0] + 2]
@@ -317,26 +279,3 @@ class Simulation:
         self._gripper_stiffness = float(model.actuator_gainprm[gripper, 0])
         gain, bias = model.actuator_gainprm[arm : arm + 7], model.actuator_biasprm[arm : arm + 7]
         self._servo_lead = -bias[:, 2] / gain[:, 0]  # kv / kp [s]
-        self._wrench = np.zeros(6)
-
-    def _index_owners(self) -> None:
-        """Precompute for each geom whom it belongs to: an object's index, the robot, or elsewhere."""
-        model = self.model
-        body_owner = np.full(model.nbody, _ELSEWHERE)
-        body_is_hand = np.zeros(model.nbody, bool)
-        objects = {model.body(name).id: index for index, name in enumerate(self.scene.objects)}
-        hand = model.body(panda.PREFIX + "hand").id
-        for body in range(1, model.nbody):  # parents come before children
-            parent = model.body_parentid[body]
-            if body in objects:
-                body_owner[body] = objects[body]
-            elif model.body(body).name.startswith(panda.PREFIX):
-                body_owner[body] = _ROBOT
-            else:
-                body_owner[body] = body_owner[parent]
-            body_is_hand[body] = body == hand or body_is_hand[parent]
-        self._owner = body_owner[model.geom_bodyid]
-        self._is_hand = body_is_hand[model.geom_bodyid]
-        self._pad_side = np.zeros(model.ngeom, int)  # 1 left, 2 right
-        self._pad_side[model.geom(panda.PREFIX + "left_pad").id] = 1
-        self._pad_side[model.geom(panda.PREFIX + "right_pad").id] = 2

@@ -99,5 +99,9 @@ def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
         userdata=(cloth.elevation / top).ravel(),
     )
     spec.worldbody.add_geom(
-        name="cloth", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="cloth", pos=[*CENTRE, 0.0], rgba=list(RGBA)
+        name="cloth",
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname="cloth",
+        pos=[*CENTRE, 0.0],
+        rgba=list(RGBA),
     )

@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+import fakes
 import pytest
 
-import fakes
 from mpgrasp.bench.__main__ import main, parse_weights
 from mpgrasp.exceptions import ConfigError
 
@@ -58,10 +58,9 @@ def test_lines_have_all_promised_keys_in_sorted_order(fake_world: object, tmp_pa
     (text,) = (tmp_path / "episodes.jsonl").read_text().splitlines()
     keys = list(json.loads(text))
     assert keys == sorted(keys)
-    assert set(keys) >= set(
-        "suite seed episode object detector controller outcome success sim_time_s ticks reflex grasp timing "
-        "min_singular_value path_length_m jerk_rms state_hash".split()
-    )
+    what = {"suite", "seed", "episode", "object", "detector", "controller", "outcome", "success", "grasp"}
+    how = {"sim_time_s", "ticks", "reflex", "min_singular_value", "path_length_m", "jerk_rms"}
+    assert set(keys) >= what | how | {"timing", "state_hash"}
 
 
 def test_quiet_shows_the_table_alone(

@@ -9,10 +9,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+import fakes
 import numpy as np
 import pytest
 
-import fakes
 from mpgrasp.bench.plain import difference, one_line, plain
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.run_directory import RunDirectory

@@ -74,7 +74,7 @@ def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
 
 
 def test_unknown_episode_setting_is_refused() -> None:
-    with pytest.raises(ConfigError, match="unknown key.*'speed'"):
+    with pytest.raises(ConfigError, match=r"unknown key.*'speed'"):
         parse_suite("s", MINIMAL | {"episode": {"speed": 1}}).episode_config()
 
 

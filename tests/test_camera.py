@@ -43,7 +43,7 @@ XML = """
 SMALL = CameraIntrinsics(fx=130.0, fy=150.0, cx=81.0, cy=57.3, width=160, height=120)
 
 try:
-    rasteriser.gl_context()
+    rasteriser.require_gl()
     HAS_GL = True
 except CameraError:
     HAS_GL = False
@@ -225,6 +225,32 @@ def test_colour_images_have_the_geometry_of_the_frames(world) -> None:
 
 
 @needs_gl
+def test_cameras_side_by_side_do_not_disturb_each_other(world) -> None:
+    model, data = world
+    other = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><light pos="0 0 2"/><geom type="sphere" size=".1"/></worldbody></mujoco>'
+    )
+    other_data = mujoco.MjData(other)
+    mujoco.mj_forward(other, other_data)
+    first = WristCamera(model, "gl", None, intrinsics=SMALL)
+    depth = first.true_frame(data).depth
+    rgb = first.rgb(data)
+    second = WristCamera(other, "gl", None, crop=200)
+    pose = looking_down([0, 0, 0.5])
+    sphere = second.render(other_data, pose).depth
+    picture = second.rgb(other_data, pose)
+    assert sphere[100, 100] == pytest.approx(0.4, abs=1e-3)
+    for _ in range(2):
+        np.testing.assert_array_equal(first.true_frame(data).depth, depth)
+        np.testing.assert_array_equal(second.rgb(other_data, pose), picture)
+        np.testing.assert_array_equal(first.rgb(data), rgb)
+        np.testing.assert_array_equal(second.render(other_data, pose).depth, sphere)
+    del second
+    np.testing.assert_array_equal(first.true_frame(data).depth, depth)
+    np.testing.assert_array_equal(first.rgb(data), rgb)
+
+
+@needs_gl
 def test_closing_frees_and_a_later_image_starts_anew(world) -> None:
     model, data = world
     camera = WristCamera(model, "gl", None, intrinsics=SMALL)
@@ -254,7 +280,7 @@ def _no_gl(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     def refuse() -> None:
         raise CameraError("OpenGL cannot be initialised", allowed="a machine with EGL")
 
-    monkeypatch.setattr(camera_module, "gl_context", refuse)
+    monkeypatch.setattr(camera_module, "require_gl", refuse)
     camera_module._gl_or_notice.cache_clear()
     yield
     camera_module._gl_or_notice.cache_clear()

@@ -36,7 +36,8 @@ XML = """
     <body name="stick" pos="0.5 0 .03"><freejoint/>
       <geom type="box" size=".03 .01 .004" material="red"/>
       <geom type="capsule" size=".005 .02"/><geom type="cylinder" size=".005 .02"/>
-      <geom type="sphere" size=".01"/><geom type="ellipsoid" size=".01 .02 .01"/><geom type="mesh" mesh="wedge"/>
+      <geom type="sphere" size=".01"/><geom type="ellipsoid" size=".01 .02 .01"/>
+      <geom type="mesh" mesh="wedge"/>
     </body>
     <camera name="panda/wrist" pos="0.5 0 0.5" fovy="60"/>
   </worldbody>
@@ -80,7 +81,12 @@ def _play(recorder: Recorder, simulation: Any, ticks: int = 6) -> None:
                 T_world_camera=frame.T_world_camera,
                 time=frame.time,
             )
-        grids = {"entropy": rng.random((20, 30)), "utility": rng.random((20, 30)), "peak": True, "cost": 0.3}
+        grids: dict[str, Any] = {
+            "entropy": rng.random((20, 30)),
+            "utility": rng.random((20, 30)),
+            "peak": True,
+            "cost": 0.3,
+        }
         recorder.tick(
             TickRecord(
                 phase="reach" if seeing else "lift",

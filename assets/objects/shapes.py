@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
@@ -12,6 +14,18 @@ from mpgrasp.objects import convex_pieces
 MM = 1e-3
 WHOLE = 12
 """Wedges that a full ring is cut into."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One object before it is written."""
+
+    parts: list[Part]
+    grams: float
+    friction: float
+    rgba: tuple[float, float, float]
+    provenance: str
+    rolls: bool = False
 
 
 def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0), yaw: float = 0.0) -> Part:

@@ -187,6 +187,7 @@ def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
     """
     from mpgrasp.bench.provenance import provenance, sha256
     from mpgrasp.bench.world_card import world_card
+    from mpgrasp.paths import WEIGHTS
 
     return {
         "format": 1,
@@ -198,8 +199,9 @@ def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
             "detectors": [
                 {
                     "name": name,
-                    "weights": None if (file := plan.weights.get(name)) is None else str(file),
-                    "sha256": None if file is None else sha256(file),
+                    "weights": str(given) if (given := plan.weights.get(name)) else None,
+                    # of the shipped weights where none are given; a plug-in's own are its own affair
+                    "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
                     "config": getattr(detector, "config", None),
                 }
                 for name, detector in player.detectors.items()

@@ -52,7 +52,16 @@ def load_detector(name: str, weights: Path | None = None) -> GraspDetector:
     if ":" not in name:
         from mpgrasp.detectors import make_detector
 
-        detector: GraspDetector = make_detector(name, weights=weights)
+        try:
+            detector: GraspDetector = make_detector(name, weights=weights)
+        except MpgraspError:
+            raise
+        except Exception as error:  # a damaged file makes its reader fail in any way
+            raise WeightsError(
+                f"weights of {name} cannot be used ({type(error).__name__}: {error})",
+                got="the shipped ones" if weights is None else str(weights),
+                allowed=f"a weights file of {name}",
+            ) from error
         return detector
     arguments = {} if weights is None else {"weights": weights}
     return _make("detector", name, arguments, _DETECTOR_METHODS)

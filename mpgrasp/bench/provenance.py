@@ -49,8 +49,10 @@ def git_state() -> dict[str, Any] | None:
     return None if commit is None else {"commit": commit, "modified": bool(changes)}
 
 
-def sha256(file: Path) -> str:
-    """Hash of a file's content."""
+def sha256(file: Path) -> str | None:
+    """Hash of a file's content; None where there is no such file."""
+    if not file.is_file():
+        return None
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

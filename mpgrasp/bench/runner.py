@@ -156,9 +156,13 @@ class Player:
     def _recorder(self, task: Task) -> Recorder:
         if self.plan.recordings is None or task.episode >= self.plan.record:
             return NullRecorder()
+        from mpgrasp.film import FilmConfig, FilmRecorder
+        from mpgrasp.recording import TeeRecorder
         from mpgrasp.rerun_recorder import RerunRecorder
 
-        return RerunRecorder(self.plan.recordings / f"{task.stem}.rrd")
+        stem = self.plan.recordings / task.stem
+        film = FilmRecorder(f"{stem}.gif", config=FilmConfig(backend=self.plan.camera))
+        return TeeRecorder(RerunRecorder(f"{stem}.rrd"), film)
 
 
 def _real_run_episode() -> RunEpisode:

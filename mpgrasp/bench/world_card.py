@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def world_card(suite: Suite, config: EpisodeConfig, seed: int) -> dict[str, Any]:
-    """Physics and camera of a run, with the keys `physics` and `camera`.
+    """Physics, camera and arm of a run, with the keys `physics`, `camera`, `motion`, `ik` and `reflex`.
 
     Builds the first scene of every turn on the way, so that objects that cannot be used come to light
     before the first episode.
@@ -23,7 +23,11 @@ def world_card(suite: Suite, config: EpisodeConfig, seed: int) -> dict[str, Any]
         CameraError: the camera backend is not to be had.
     """
     from mpgrasp.camera import WristCamera
+    from mpgrasp.ik import IkConfig
+    from mpgrasp.reflex import ReflexConfig
     from mpgrasp.scene import build_scene
+    from mpgrasp.sensor_noise import DepthNoise
+    from mpgrasp.trajectory import MotionConfig
 
     scenes = [
         build_scene(suite.scene_config(episode), episode_seed(suite.name, seed, episode))
@@ -32,7 +36,14 @@ def world_card(suite: Suite, config: EpisodeConfig, seed: int) -> dict[str, Any]
     camera = WristCamera(scenes[0].model, backend=config.camera_backend)
     return {
         "physics": physics_card(scenes[0].model),
-        "camera": {"backend": camera.backend, "intrinsics": camera.intrinsics},
+        "camera": {
+            "backend": camera.backend,
+            "intrinsics": camera.intrinsics,
+            "noise": DepthNoise() if config.noise else None,
+        },
+        "motion": MotionConfig(),
+        "ik": IkConfig(),
+        "reflex": ReflexConfig(),
     }
 
 

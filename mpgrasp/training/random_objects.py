@@ -10,14 +10,17 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mpgrasp.geometry import FloatArray
-from mpgrasp.object_model import MAX_SIZE, ObjectModel, Part
+from mpgrasp.object_model import ObjectModel, Part
 from mpgrasp.objects import OBJECT_SETS, load_object
 from mpgrasp.scene import WORKSPACE_CENTRE, SceneConfig
 
 GRASPABLE = 0.072
 """Widest thing that the gripper closes on with a little room [m]."""
+LONGEST = 0.2
+"""Longest edge of a bounding box [m]."""
 DENSITY = (200.0, 1500.0)
 """[kg/m^3]"""
 LIKENESS = 0.15
@@ -27,7 +30,8 @@ THIN_HEIGHT = (0.002, 0.012)
 THIN_SCENES = 0.5
 """Share of the scenes that hold thin objects alone."""
 
-Family = Callable[[np.random.Generator, str, "FloatArray"], list[Part]]
+Family = Callable[[np.random.Generator], list[Part]]
+"""Draws the parts of one object."""
 
 
 def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectModel:
@@ -39,18 +43,19 @@ def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectMode
         thin: lie 2 to 12 mm high.
     """
     while True:
-        family = _pick(rng, _THIN_FAMILIES if thin else _FAMILIES)
-        parts = family(rng)
-        model = ObjectModel(
+        parts = _pick(rng, _THIN_FAMILIES if thin else _FAMILIES)(rng)
+        density, friction, (r, g, b) = rng.uniform(*DENSITY), rng.uniform(0.4, 0.9), rng.uniform(0.15, 0.9, 3)
+        size = np.ptp(np.vstack([part.points for part in parts]), axis=0)
+        if size.max() > LONGEST or resembles_evaluation_object(size):
+            continue
+        return ObjectModel(
             name=name,
             parts=tuple(parts),
-            mass=rng.uniform(*DENSITY) * sum(part.volume for part in parts),
-            friction=rng.uniform(0.4, 0.9),
-            rgba=(*rng.uniform(0.15, 0.9, 3), 1.0),
+            mass=density * sum(part.volume for part in parts),
+            friction=friction,
+            rgba=(float(r), float(g), float(b), 1.0),
             provenance="random",
-        ) if _fits(parts) else None
-        if model is not None and not resembles_evaluation_object(model):
-            return model
+        )
 
 
 def training_scene_config(rng: np.random.Generator) -> SceneConfig:
@@ -62,7 +67,9 @@ def training_scene_config(rng: np.random.Generator) -> SceneConfig:
     pile = n > 1 and rng.random() < 0.4
     offset = rng.uniform(-0.2, 0.2, 2)
     # many objects need room; a pile makes its own
-    half_extent = rng.uniform(0.08, 0.12) if pile else rng.uniform(0.02, 0.05) + 0.045 * np.sqrt(n)
+    half_extent = (
+        rng.uniform(0.06, 0.09) + 0.02 * np.sqrt(n) if pile else rng.uniform(0.02, 0.05) + 0.045 * np.sqrt(n)
+    )
     return SceneConfig(
         objects=objects,
         placing="pile" if pile else "scatter",
@@ -74,9 +81,9 @@ def training_scene_config(rng: np.random.Generator) -> SceneConfig:
     )
 
 
-def resembles_evaluation_object(model: ObjectModel) -> bool:
-    """Whether all edges of the bounding box lie within `LIKENESS` of an evaluation object's."""
-    ratio = np.sort(model.size) / _evaluation_sizes()
+def resembles_evaluation_object(size: ArrayLike) -> bool:
+    """Whether all three edges `size` [m], however turned, lie within `LIKENESS` of an evaluation object's."""
+    ratio = np.sort(np.asarray(size, float)) / _evaluation_sizes()
     return bool((np.abs(ratio - 1) < LIKENESS).all(axis=1).any())
 
 
@@ -86,18 +93,12 @@ def _evaluation_sizes() -> FloatArray:
     return np.array([np.sort(load_object(name).size) for names in OBJECT_SETS.values() for name in names])
 
 
-def _fits(parts: list[Part]) -> bool:
-    """Not too large for the table, and narrow enough somewhere to be picked up from above."""
-    size = np.ptp(np.vstack([part.points for part in parts]), axis=0)
-    return bool(size.max() < min(0.2, MAX_SIZE) and size.min() > 0.0015)
-
-
-def _pick(rng: np.random.Generator, families: dict[Callable[..., list[Part]], float]) -> Callable[..., list[Part]]:
+def _pick(rng: np.random.Generator, families: dict[Family, float]) -> Family:
     weights = np.array(list(families.values()))
     return list(families)[rng.choice(len(families), p=weights / weights.sum())]
 
 
-def _box(size: FloatArray, position: tuple[float, float, float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Part:
+def _box(size: ArrayLike, position: tuple[float, float, float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Part:
     """Box of full edges `size` [m]."""
     return Part(
         shape="box",
@@ -107,7 +108,8 @@ def _box(size: FloatArray, position: tuple[float, float, float] = (0.0, 0.0, 0.0
     )
 
 
-_LYING = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)  # turns a part's z axis into x
+_STANDING = (1.0, 0.0, 0.0, 0.0)
+_LYING = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # turns a part's z axis into x
 
 
 def _thickness(rng: np.random.Generator) -> float:
@@ -173,11 +175,12 @@ def _stick(rng: np.random.Generator) -> list[Part]:
 
 def _cylinder(rng: np.random.Generator) -> list[Part]:
     size = (rng.uniform(0.008, 0.035), rng.uniform(0.01, 0.06))
-    return [Part(shape="cylinder", size=size, quaternion=_LYING if rng.random() < 0.6 else (1.0, 0.0, 0.0, 0.0))]
+    return [Part(shape="cylinder", size=size, quaternion=_LYING if rng.random() < 0.6 else _STANDING)]
 
 
 def _capsule(rng: np.random.Generator) -> list[Part]:
-    return [Part(shape="capsule", size=(rng.uniform(0.008, 0.03), rng.uniform(0.008, 0.06)), quaternion=_LYING)]
+    size = (rng.uniform(0.008, 0.03), rng.uniform(0.008, 0.06))
+    return [Part(shape="capsule", size=size, quaternion=_LYING)]
 
 
 def _ellipsoid(rng: np.random.Generator) -> list[Part]:
@@ -219,7 +222,8 @@ def _stacked(rng: np.random.Generator) -> list[Part]:
 def _handled(rng: np.random.Generator) -> list[Part]:
     """A head with a handle: hammers, brushes, screwdrivers, pans."""
     radius, length = rng.uniform(0.006, 0.016), rng.uniform(0.03, 0.06)
-    handle = Part(shape="capsule" if rng.random() < 0.5 else "cylinder", size=(radius, length), quaternion=_LYING)
+    kind = "capsule" if rng.random() < 0.5 else "cylinder"
+    handle = Part(shape=kind, size=(radius, length), quaternion=_LYING)
     half = (rng.uniform(0.008, 0.03), rng.uniform(0.01, 0.034), rng.uniform(0.006, 0.025))
     shape = "box" if rng.random() < 0.6 else "ellipsoid"
     return [handle, Part(shape=shape, size=half, position=(length + 0.8 * half[0], 0.0, 0.0))]
@@ -231,9 +235,8 @@ def _ring(radius: float, width: float, height: float, n: int = 12) -> list[Part]
     middle = radius - width / 2
     tangent = 2 * radius * np.tan(np.pi / n)
     angles = 2 * np.pi * np.arange(n) / n
-    return [
-        _box((width, tangent, height), (middle * np.cos(a), middle * np.sin(a), 0.0), yaw=float(a)) for a in angles
-    ]
+    size = (width, tangent, height)
+    return [_box(size, (middle * np.cos(a), middle * np.sin(a), 0.0), yaw=float(a)) for a in angles]
 
 
 def _letter(rng: np.random.Generator, height: float, width: float, length: float) -> list[Part]:
@@ -256,7 +259,7 @@ def _polygon(rng: np.random.Generator) -> FloatArray:
     return rng.uniform(0.75, 1.0, n)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-_THIN_FAMILIES: dict[Callable[[np.random.Generator], list[Part]], float] = {
+_THIN_FAMILIES: dict[Family, float] = {
     _thin_plate: 3,
     _thin_stick: 4,
     _thin_stepped: 3,
@@ -266,7 +269,7 @@ _THIN_FAMILIES: dict[Callable[[np.random.Generator], list[Part]], float] = {
     _thin_rod: 1.5,
     _thin_hull: 1.5,
 }
-_FAMILIES: dict[Callable[[np.random.Generator], list[Part]], float] = {
+_FAMILIES: dict[Family, float] = {
     _block: 3,
     _stick: 2,
     _cylinder: 2,

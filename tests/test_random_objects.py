@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mpgrasp.objects import OBJECT_SETS, load_object
+from mpgrasp.scene import build_scene
+from mpgrasp.training.random_objects import (
+    LIKENESS,
+    random_object,
+    resembles_evaluation_object,
+    training_scene_config,
+)
+
+NAMES = [name for names in OBJECT_SETS.values() for name in names]
+
+
+def test_no_training_object_is_within_reach_of_an_evaluation_object() -> None:
+    rng = np.random.default_rng(0)
+    known = np.sort([load_object(name).size for name in NAMES], axis=1)
+    for k in range(400):
+        size = np.sort(random_object(rng, f"train_{k}", thin=k % 2 == 0).size)
+        assert (np.abs(size / known - 1).max(axis=1) >= LIKENESS).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_evaluation_object_resembles_itself_however_it_is_turned(name: str) -> None:
+    size = load_object(name).size
+    assert resembles_evaluation_object(size)
+    assert resembles_evaluation_object(np.roll(size, 1) * 1.1)
+
+
+def test_thin_objects_are_thin_and_all_objects_are_sane() -> None:
+    rng = np.random.default_rng(1)
+    for k in range(300):
+        thin = k % 2 == 0
+        model = random_object(rng, "o", thin)
+        assert max(model.size) <= 0.2
+        assert 0.0005 < model.mass < 1.5
+        assert 199 < model.mass / model.volume < 1501
+        if thin:
+            assert 0.0019 < model.size[2] < 0.0121
+
+
+def test_most_objects_have_a_width_that_the_gripper_can_close_on() -> None:
+    rng = np.random.default_rng(2)
+    narrow = [min(random_object(rng, "o", k % 2 == 0).size[:2]) < 0.075 for k in range(200)]
+    assert np.mean(narrow) > 0.9
+
+
+def test_same_generator_state_gives_the_same_scene() -> None:
+    first, second = (training_scene_config(np.random.default_rng(7)) for _ in range(2))
+    assert first.centre == second.centre
+    assert [o.size for o in first.objects] == [o.size for o in second.objects]  # type: ignore[union-attr]
+
+
+def test_about_half_of_the_scenes_hold_thin_objects_alone() -> None:
+    rng = np.random.default_rng(3)
+    configs = [training_scene_config(rng) for _ in range(300)]
+    thin = [all(o.size[2] < 0.0121 for o in c.objects) for c in configs]  # type: ignore[union-attr]
+    assert 0.45 < np.mean(thin) < 0.75
+    assert {c.placing for c in configs} == {"scatter", "pile"}
+    counts = [len(c.objects) for c in configs]
+    assert min(counts) == 1
+    assert 8 <= max(counts) <= 10
+    assert all(0 <= c.cloth_unevenness <= 0.0015 for c in configs)
+    assert max(abs(c.centre[1]) for c in configs) <= 0.2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_training_scenes_settle(seed: int) -> None:
+    scene = build_scene(training_scene_config(np.random.default_rng(seed)), seed, robot=False)
+    assert (scene.height_map().label > 0).any()
