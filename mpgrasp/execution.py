@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion import ArmDriver
 from mpgrasp.reflex import Reflex
-from mpgrasp.trajectory import nearest_yaw
+from mpgrasp.trajectory import nearest_yaw, shake
 
 PHASES = ("pregrasp", "descend", "close", "lift", "hold", "shake")
 OUTCOMES = ("success", "reflex", "collision", "missed", "slipped")
@@ -38,7 +39,11 @@ class ExecutionConfig:
     approach_speed: float = 0.25
     """[m/s]"""
     descent_speed: float = 0.05
-    """[m/s]"""
+    """Above the seen surface [m/s]."""
+    entry_speed: float = 0.035
+    """Below it, where the fingers pass between objects and may land on one [m/s]."""
+    entry_height: float = 0.005
+    """Height of the finger tips over the seen surface at which that begins [m]."""
     guarded_speed: float = 0.02
     """Of the last millimetres, where contact with the support is expected [m/s]."""
     guarded_height: float = 0.010
@@ -48,7 +53,7 @@ class ExecutionConfig:
     plan itself ends higher."""
     contact_threshold: float = 3.0
     """Force that counts as contact [N]."""
-    contact_deceleration: float = 1.0
+    contact_deceleration: float = 1.5
     """Braking at contact [m/s2]."""
     back_off: float = 0.0005
     """Rise after contact, so that the tips do not press on the support while they close [m]."""
@@ -81,7 +86,15 @@ class ExecutionConfig:
         for name, value in vars(self).items():
             if not (np.isfinite(value) and value >= 0):
                 raise ConfigError(f"{name} must be finite and not negative", got=value)
-        for name in ("approach_speed", "descent_speed", "guarded_speed", "lift_speed", "shake_time", "lift"):
+        for name in (
+            "approach_speed",
+            "descent_speed",
+            "entry_speed",
+            "guarded_speed",
+            "lift_speed",
+            "shake_time",
+            "lift",
+        ):
             if getattr(self, name) == 0:
                 raise ConfigError(f"{name} must be positive", got=0)
         if self.success_height >= self.lift:
@@ -178,26 +191,24 @@ class _Execution:
             duration=self.simulation.time - self.start,
         )
 
-    # ---- phases
-
     def _pregrasp(self) -> None:
         c = self.config
         self.simulation.open_gripper(min(self.grasp.width + c.opening_margin, panda.GRIPPER_MAX_WIDTH))
         target = self._pose(float(self.grasp.position[2]) + c.approach)
-        here = self.driver.T_desired
-        if here[2, 3] < target[2, 3] - 1e-3:
+        missing = float(target[2, 3] - self.driver.T_desired[2, 3])
+        if missing > 1e-3:
             # up first: the hand may stand between objects
-            retreat = here.copy()
-            retreat[2, 3] = target[2, 3]
-            self._move(retreat, c.approach_speed)
+            self._rise(missing, c.approach_speed)
         self._move(target, c.approach_speed)
 
     def _descend(self) -> None:
         c = self.config
-        if self.planned > c.guarded_height:
-            stages = [(self.planned, c.descent_speed)]
-        else:
-            stages = [(c.guarded_height, c.descent_speed), (self.planned, c.guarded_speed)]
+        entry = max(float(self.grasp.position[2]) + c.entry_height, c.guarded_height)
+        stages = (
+            (entry, c.descent_speed),
+            (max(self.planned, c.guarded_height), c.entry_speed),
+            (self.planned, c.guarded_speed),
+        )
         for tip, speed in stages:
             target = self._pose(tip + panda.FINGERTIP_BEYOND_TCP)
             if target[2, 3] >= self.driver.T_desired[2, 3]:
@@ -212,9 +223,8 @@ class _Execution:
         c = self.config
         self.contact_height = self._tip()
         # the desired pose lies below the felt contact by what the servo gave way
-        rest = self.driver.T_desired.copy()
-        rest[2, 3] = max(rest[2, 3], self.contact_height + panda.FINGERTIP_BEYOND_TCP + c.back_off)
-        self._move(rest, c.guarded_speed)
+        free = self.contact_height + panda.FINGERTIP_BEYOND_TCP + c.back_off
+        self._rise(max(0.0, free - self.driver.T_desired[2, 3]), c.guarded_speed)
 
     def _close(self) -> None:
         c, simulation = self.config, self.simulation
@@ -232,9 +242,7 @@ class _Execution:
         self.width = simulation.gripper_width
 
     def _lift(self) -> None:
-        target = self.driver.T_desired.copy()
-        target[2, 3] += self.config.lift
-        self._move(target, self.config.lift_speed)
+        self._rise(self.config.lift, self.config.lift_speed)
 
     def _hold(self) -> None:
         self.driver.wait(self.config.hold_time, self._tick)
@@ -242,18 +250,14 @@ class _Execution:
     def _shake(self) -> None:
         c = self.config
         R = self.driver.T_desired[:3, :3]
+
+        def offset(axis: FloatArray, t: float) -> FloatArray:
+            return axis * shake(t, c.shake_amplitude, c.shake_frequency, c.shake_time)
+
         # sideways both along and across the closing direction, then up and down
         for axis in ((R[:, 0] + R[:, 1]) / np.sqrt(2), np.array([0.0, 0.0, 1.0])):
-            self.driver.follow(lambda t, axis=axis: self._swing(t) * axis, c.shake_time, self._tick)  # type: ignore[misc]
+            self.driver.follow(partial(offset, axis), c.shake_time, self._tick)
         self.driver.wait(c.settle_after_shake, self._tick)
-
-    def _swing(self, t: float) -> float:
-        """Offset [m] of a shake: an oscillation that swells and fades, at rest at both ends."""
-        c = self.config
-        envelope = np.sin(np.pi * t / c.shake_time) ** 2
-        return float(c.shake_amplitude * envelope * np.sin(2 * np.pi * c.shake_frequency * t))
-
-    # ---- verdict
 
     def _verdict(self) -> ExecutionResult:
         c, reflex = self.config, self.driver.reflex
@@ -275,8 +279,6 @@ class _Execution:
             return ExecutionResult(outcome="collision", reason=reason)
         return ExecutionResult(outcome="missed", reason="nothing stood between the closed pads")
 
-    # ---- helpers
-
     def _choose_yaw(self) -> float:
         """Heading of the hand's x axis: the nearer of the grasp's two, unless only the other is in reach."""
         T = self.driver.T_desired
@@ -293,6 +295,11 @@ class _Execution:
 
     def _pose(self, z: float) -> FloatArray:
         return looking_down([self.grasp.position[0], self.grasp.position[1], z], self.yaw)
+
+    def _rise(self, height: float, speed: float) -> None:
+        target = self.driver.T_desired.copy()
+        target[2, 3] += height
+        self._move(target, speed)
 
     def _move(self, target: FloatArray, speed: float, until: Callable[[], bool] | None = None) -> bool:
         return self.driver.move_to(

@@ -20,7 +20,8 @@ import numpy as np
 
 from mpgrasp import panda
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, rotation_vector, transform
+from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.trajectory import integrate_pose, pose_error
 
 TCP_SITE = "tcp"
 
@@ -218,8 +219,8 @@ class DifferentialIK:
             T = self.pose(q)
             error = pose_error(T, T_world_tcp)
             # 10 cm and half a radian at a time keep the linearisation honest
-            lengths = np.linalg.norm(error[:3]) / 0.1, np.linalg.norm(error[3:]) / 0.5
-            target = integrate_pose(T, error, 1.0 / max(1.0, *lengths))
+            lengths = [1.0, np.linalg.norm(error[:3]) / 0.1, np.linalg.norm(error[3:]) / 0.5]
+            target = integrate_pose(T, error, 1.0 / float(np.max(lengths)))
             dq = self.step(q, target, dt, posture_rate=0.2 / dt).dq
             # what is left of the motion once the tool has arrived is the elbow's
             if np.linalg.norm(error) < tolerance and np.linalg.norm(dq) * dt < 1e-3:
@@ -259,7 +260,9 @@ class DifferentialIK:
         # the program closes 95 % of the gap to a joint limit per tick
         j = int(np.argmin(slack))
         if slack[j] < 2e-3:
-            bound = self._q_min[j] if after[j] - self._q_min[j] < self._q_max[j] - after[j] else self._q_max[j]
+            bound = (
+                self._q_min[j] if after[j] - self._q_min[j] < self._q_max[j] - after[j] else self._q_max[j]
+            )
             return "joint_position", j + 1, float(after[j]), float(bound)
         j = int(np.argmax(np.abs(dq) / self._dq_max))
         if abs(dq[j]) > 0.999 * self._dq_max[j]:
@@ -271,7 +274,8 @@ class DifferentialIK:
 
     def clearance(self) -> float:
         """Least distance [m] within the pairs that must not collide, at the last pose; inf beyond
-        `collision_range`."""
+        `collision_range`.
+        """
         if not self._pairs:
             return np.inf
         limit = next(iter(self._collision_limits.values()), None)
@@ -285,22 +289,6 @@ class DifferentialIK:
         return float(least) if least < reach else np.inf
 
 
-def pose_error(T_from: FloatArray, T_to: FloatArray) -> FloatArray:
-    """Twist (6,), world axes, that carries one pose into the other within one second [m, rad]."""
-    rotation = rotation_vector(T_to[:3, :3] @ T_from[:3, :3].T)
-    return np.concatenate([T_to[:3, 3] - T_from[:3, 3], rotation])
-
-
 def solve_pose(q0: FloatArray, T_world_tcp: FloatArray, ik: DifferentialIK | None = None) -> FloatArray:
     """Joint positions (7,) [rad] that put the tool at a pose; see `DifferentialIK.solve`."""
     return (ik or DifferentialIK()).solve(q0, T_world_tcp)
-
-
-def integrate_pose(T: FloatArray, twist: FloatArray, dt: float) -> FloatArray:
-    """Pose (4, 4) after moving with `twist` (6,), world axes [m/s, rad/s], for dt [s]."""
-    w = twist[3:] * dt
-    angle = float(np.linalg.norm(w))
-    K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
-    a, b = (np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
-    R = np.eye(3) + a * K + b * (K @ K)
-    return transform(R @ T[:3, :3], T[:3, 3] + twist[:3] * dt)

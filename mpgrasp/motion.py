@@ -16,10 +16,10 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.ik import DifferentialIK, IkSolution, integrate_pose, pose_error
+from mpgrasp.ik import DifferentialIK, IkSolution
 from mpgrasp.reflex import Reflex, ReflexMonitor
 from mpgrasp.simulation import Simulation
-from mpgrasp.trajectory import MotionConfig, TwistRamp, path_profile
+from mpgrasp.trajectory import MotionConfig, TwistRamp, integrate_pose, path_profile, pose_error
 
 FORCE_WINDOW = 5
 """Ticks over which the external force is averaged before it can stop the arm. The arm weighs some 20 kg as
@@ -93,8 +93,8 @@ class ArmDriver:
         self.T_desired = self.ik.pose(self.q)
         self.solution: IkSolution | None = None
         self._start = self.simulation.time
-        self._dq = np.zeros(7)
-        self._twist = np.zeros(6)
+        self._dq: FloatArray = np.zeros(7)
+        self._twist: FloatArray = np.zeros(6)
         self._forces: deque[FloatArray] = deque([np.zeros(3)] * FORCE_WINDOW, maxlen=FORCE_WINDOW)
         self._velocities: deque[FloatArray] = deque(maxlen=3)
         self._position = np.array(self.simulation.T_world_tcp[:3, 3])
@@ -141,7 +141,7 @@ class ArmDriver:
         return np.nan if self.solution is None else self.solution.manipulability
 
     def drive(self, twist: FloatArray, duration: float, on_tick: OnTick | None = None) -> Reflex | None:
-        """Follow a twist (6,), world axes [m/s, rad/s], for a time [s]; ramps, and does not stop at the end."""
+        """Follow a twist (6,), world axes [m/s, rad/s], for a time [s]; it ramps, and moves on."""
         for _ in range(round(duration / self.config.dt)):
             self._tick(integrate_pose(self.T_desired, self.ramp.step(twist), self.config.dt), on_tick)
             if self.reflex is not None:
@@ -219,7 +219,8 @@ class ArmDriver:
         self, path: Callable[[float], FloatArray], duration: float, on_tick: OnTick | None = None
     ) -> Reflex | None:
         """Follow offsets (3,) [m] of the tool point as a function of time [s]; the path must begin and
-        end at rest and at zero."""
+        end at rest and at zero.
+        """
         self.stop(on_tick)
         start = self.T_desired
         for k in range(1, round(duration / self.config.dt) + 1):
@@ -286,9 +287,7 @@ class ArmDriver:
         self._near += c.dt * (s.min_singular_value < c.singularity_warning)
         self._path_length += float(np.linalg.norm(T[:3, 3] - self._position))
         self._position = np.array(T[:3, 3])
-        self._max_tracking = max(
-            self._max_tracking, float(np.linalg.norm(T[:3, 3] - self.T_desired[:3, 3]))
-        )
+        self._max_tracking = max(self._max_tracking, float(np.linalg.norm(T[:3, 3] - self.T_desired[:3, 3])))
         self._velocities.append(np.array(achieved[:3]))
         if len(self._velocities) == 3:
             a, b, d = self._velocities

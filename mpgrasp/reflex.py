@@ -91,14 +91,17 @@ class ReflexConfig:
     ordinary motion leaves micrometres."""
     ik_residual_angle: float = 0.02
     """The same for orientation [rad]."""
-    contact_force: float = 80.0
-    """External force on the robot, averaged over 50 ms [N]. Landing on a hard table at 0.05 m/s makes 63 N, a
-    grasped object makes its weight, and pressing on makes 12 N per millimetre."""
+    contact_force: float = 100.0
+    """External force on the robot, averaged over 50 ms [N]. Landing on a hard table at 0.05 m/s makes 60 to
+    120 N (the arm weighs some 20 kg at the tool), at 0.035 m/s about 50, a held object makes its weight,
+    and pressing on makes 12 N per millimetre."""
 
     def __post_init__(self) -> None:
         for name in ("q_min", "q_max", "dq_max", "ddq_max"):
             if np.shape(getattr(self, name)) != (7,):
-                raise ConfigError(f"{name} has the wrong shape", got=np.shape(getattr(self, name)), allowed="(7,)")
+                raise ConfigError(
+                    f"{name} has the wrong shape", got=np.shape(getattr(self, name)), allowed="(7,)"
+                )
         if not np.all(self.q_min < self.q_max):
             raise ConfigError("q_min must lie below q_max", got=self.q_min.tolist())
         for name in (
@@ -170,7 +173,9 @@ class ReflexMonitor:
             if not c.q_min[j] <= q[j] <= c.q_max[j]:
                 bound = c.q_min[j] if q[j] < c.q_min[j] else c.q_max[j]
                 return _reflex("joint_position", time, q[j], bound, joint=j + 1)
-        return _worst("joint_velocity", time, dq, c.dq_max) or _worst("joint_acceleration", time, ddq, c.ddq_max)
+        return _worst("joint_velocity", time, dq, c.dq_max) or _worst(
+            "joint_acceleration", time, ddq, c.ddq_max
+        )
 
     def _demands(self, time: float, solution: IkSolution) -> Reflex | None:
         c = self.config
@@ -196,7 +201,9 @@ class ReflexMonitor:
             "tracking_orientation", time, solution.residual_angle, c.ik_residual_angle, demanded=True
         )
 
-    def _cartesian(self, time: float, twist: FloatArray, T: FloatArray, T_desired: FloatArray) -> Reflex | None:
+    def _cartesian(
+        self, time: float, twist: FloatArray, T: FloatArray, T_desired: FloatArray
+    ) -> Reflex | None:
         c = self.config
         for limit, value, bound in (
             ("cartesian_velocity", np.linalg.norm(twist[:3]), c.cartesian_velocity),
@@ -214,7 +221,13 @@ class ReflexMonitor:
 
 
 def _reflex(
-    limit: str, time: float, value: ArrayLike, bound: ArrayLike, *, joint: int | None = None, demanded: bool = False
+    limit: str,
+    time: float,
+    value: ArrayLike,
+    bound: ArrayLike,
+    *,
+    joint: int | None = None,
+    demanded: bool = False,
 ) -> Reflex:
     return Reflex(
         limit=limit, joint=joint, value=float(np.asarray(value)), bound=float(np.asarray(bound)),

@@ -1,5 +1,4 @@
-"""Ramps and profiles: how the velocity of the tool point changes with time, so that no ordinary motion
-trips a protective stop."""
+"""Ramps and profiles that keep ordinary motion clear of protective stops, and steps of poses."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, wrap_half_pi
+from mpgrasp.geometry import FloatArray, rotation_vector, transform, wrap_half_pi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +80,9 @@ class TwistRamp:
         return self.twist
 
 
-def path_profile(length: float, angle: float, config: MotionConfig, speed: float, rotation: float) -> FloatArray:
+def path_profile(
+    length: float, angle: float, config: MotionConfig, speed: float, rotation: float
+) -> FloatArray:
     """Shares of a straight-line move after each tick, (n,), from just above 0 to 1.
 
     A trapezoid of velocity, smoothed as `TwistRamp` does, that keeps both the linear and the angular
@@ -113,3 +114,24 @@ def nearest_yaw(angle: float, yaw: float) -> float:
     A grasp is the same after half a turn; the far one sends differential IK the long way round.
     """
     return yaw + float(wrap_half_pi(angle - yaw))
+
+
+def shake(t: float, amplitude: float, frequency: float, duration: float) -> float:
+    """Offset [m] at time t [s] of an oscillation [Hz] that swells and fades, at rest at both ends."""
+    return float(amplitude * np.sin(np.pi * t / duration) ** 2 * np.sin(2 * np.pi * frequency * t))
+
+
+def pose_error(T_from: FloatArray, T_to: FloatArray) -> FloatArray:
+    """Twist (6,), world axes, that carries one pose into the other within one second [m, rad]."""
+    rotation = rotation_vector(T_to[:3, :3] @ T_from[:3, :3].T)
+    return np.concatenate([T_to[:3, 3] - T_from[:3, 3], rotation])
+
+
+def integrate_pose(T: FloatArray, twist: FloatArray, dt: float) -> FloatArray:
+    """Pose (4, 4) after moving with `twist` (6,), world axes [m/s, rad/s], for dt [s]."""
+    w = twist[3:] * dt
+    angle = float(np.linalg.norm(w))
+    K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    a, b = (np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
+    R = np.eye(3) + a * K + b * (K @ K)
+    return transform(R @ T[:3, :3], T[:3, 3] + twist[:3] * dt)

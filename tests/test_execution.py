@@ -22,7 +22,8 @@ from mpgrasp.simulation import Simulation
 def stick(height: float, width: float | None = None, length: float = 0.06, **changes: Any) -> ObjectModel:
     width = height if width is None else width
     values: dict[str, Any] = {
-        "name": "stick", "friction": 0.5, "rgba": (0.5, 0.5, 0.5, 1.0), "mass": max(0.004, 900 * height * width * length),
+        "name": "stick", "friction": 0.5, "rgba": (0.5, 0.5, 0.5, 1.0),
+        "mass": max(0.004, 900 * height * width * length),
         "parts": (Part(shape="box", size=(length / 2, width / 2, height / 2)),),
     }  # fmt: skip
     return ObjectModel(**(values | changes))
@@ -32,13 +33,17 @@ def scene_with(model: ObjectModel, seed: int) -> Scene:
     return build_scene(SceneConfig(objects=(model,), half_extent=0.12), seed)
 
 
-def driver_over(scene: Scene, x: float = 0.45, y: float = 0.0, z: float = 0.175, yaw: float = 0.0) -> ArmDriver:
+def driver_over(
+    scene: Scene, x: float = 0.45, y: float = 0.0, z: float = 0.175, yaw: float = 0.0
+) -> ArmDriver:
     simulation = Simulation(scene)
     simulation.set_q(solve_pose(simulation.q, looking_down([x, y, z], yaw)))
     return ArmDriver(simulation)
 
 
-def grasp_of(driver: ArmDriver, height: float, width: float, offset: tuple[float, float] = (0.0, 0.0)) -> Grasp:
+def grasp_of(
+    driver: ArmDriver, height: float, width: float, offset: tuple[float, float] = (0.0, 0.0)
+) -> Grasp:
     """Across the stick, which lies along its x axis; the offset is in its own axes."""
     T = driver.simulation.object_pose("stick")
     position = T[:3, 3] + T[:3, 0] * offset[0] + T[:3, 1] * offset[1] + [0.0, 0.0, height / 2]

@@ -1,4 +1,4 @@
-"""Ramps bound what they promise, ordinary motion trips nothing, and impossible motion ends in a named stop."""
+"""Ramps bound what they promise, ordinary motion trips nothing, impossible motion ends in a named stop."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ def test_a_ramped_twist_obeys_acceleration_and_jerk_bounds() -> None:
     acceleration = np.diff(twists, axis=0) / config.dt
     jerk = np.diff(acceleration, axis=0) / config.dt
     window = config.smoothing * config.dt
-    for part, bound in ((slice(0, 3), config.linear_acceleration), (slice(3, 6), config.angular_acceleration)):
+    for part, bound in (
+        (slice(0, 3), config.linear_acceleration),
+        (slice(3, 6), config.angular_acceleration),
+    ):
         assert np.linalg.norm(acceleration[:, part], axis=1).max() <= bound * (1 + 1e-9)
         assert np.linalg.norm(jerk[:, part], axis=1).max() <= 2 * bound / window * (1 + 1e-9)
 
@@ -139,7 +142,7 @@ def test_a_stopped_arm_stays_where_it_stopped(scene: Scene) -> None:
     assert not driver.move_to(looking_down([0.5, 0, 0.3]))
     assert driver.wait(0.5) is reflex
     assert driver.simulation.time == time
-    driver.simulation.step(100)
+    driver.simulation.step(250)
     assert np.linalg.norm(driver.simulation.dq) < 0.01
 
 
@@ -150,7 +153,9 @@ def test_winding_up_the_wrist_ends_in_a_named_stop(scene: Scene) -> None:
     assert reflex.joint is not None
 
 
-@pytest.mark.parametrize(("position", "yaw"), [((0.6, 0.2, 0.1), 1.0), ((0.4, -0.2, 0.05), -1.5), ((0.5, 0, 0.3), 0.0)])
+@pytest.mark.parametrize(
+    ("position", "yaw"), [((0.6, 0.2, 0.1), 1.0), ((0.4, -0.2, 0.05), -1.5), ((0.5, 0, 0.3), 0.0)]
+)
 def test_a_move_ends_at_its_pose(scene: Scene, position: tuple[float, ...], yaw: float) -> None:
     driver = driver_at(scene, 0.45, 0.05, 0.4)
     target = looking_down(position, yaw)

@@ -30,7 +30,8 @@ def solution(**changes: Any) -> IkSolution:
 def check(monitor: ReflexMonitor, **changes: Any) -> Reflex | None:
     values: dict[str, Any] = {
         "time": 1.0, "dt": 0.01, "solution": solution(), "q": np.array(panda.Q_HOME), "dq": np.zeros(7),
-        "twist": np.zeros(6), "T_world_tcp": np.eye(4), "T_world_tcp_desired": np.eye(4), "contact_force": 0.0,
+        "twist": np.zeros(6), "T_world_tcp": np.eye(4), "T_world_tcp_desired": np.eye(4),
+        "contact_force": 0.0,
     }  # fmt: skip
     return monitor.check(**(values | changes))
 
@@ -51,9 +52,10 @@ def test_rest_trips_nothing() -> None:
         ({"twist": np.array([0, 0, 0, 0, 0, -2.6])}, "cartesian_rotation", None, 2.6),
         ({"T_world_tcp": transform(np.eye(3), [0.03, 0, 0])}, "tracking_position", None, 0.03),
         ({"T_world_tcp": transform(rotation_z(0.2), [0, 0, 0])}, "tracking_orientation", None, 0.2),
-        ({"contact_force": 90.0}, "contact_force", None, 90.0),
+        ({"contact_force": 110.0}, "contact_force", None, 110.0),
         (
-            {"solution": solution(residual=0.01, blocked="joint_position", blocked_joint=7, blocked_value=2.887,
+            {"solution": solution(residual=0.01, blocked="joint_position", blocked_joint=7,
+                                  blocked_value=2.887,
                                   blocked_bound=2.8873)},
             "joint_position", 7, 2.887,
         ),

@@ -229,7 +229,7 @@ def main(command: Sequence[str] | None = None) -> int:
     try:
         return run(make_parser().parse_args(command), command)
     except MpgraspError as error:
-        print(f"mpgrasp: error: {error}", file=sys.stderr)
+        print("mpgrasp: error:", " ".join(str(error).splitlines()), file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED

@@ -32,8 +32,12 @@ OFFSET_TOLERANCE = 0.004
 """Likewise the offset of the centre from the middle between the contacts [m]."""
 UNEVENNESS_TOLERANCE = 0.003
 """Likewise how far the pads' first contact stands out of the mean edge [m]."""
-ARM_TOLERANCE = 0.035
+ARM_TOLERANCE = 0.025
 """Likewise the distance of the grasp from the object's centre of mass [m]."""
+SLANT = np.deg2rad(5.0)
+"""Misalignment that the fit of the edges makes good afterwards [rad]."""
+SLIDE = 0.010
+"""Length across the closing direction over which a grasp's worth is averaged: the hand may be that far off [m]."""
 FULL_CONTACT = 0.012
 """Contact of that length across the closing direction is as good as any longer one [m]."""
 LANDING = 0.6
@@ -64,6 +68,12 @@ class HandGeometry:
     """How far above the tips anything under the palm may rise [m]."""
     palm_size: tuple[float, float] = (0.204, 0.064)
     """The palm along and across the closing direction [m]."""
+    camera_clearance: float = 0.070
+    """How far above the tips anything under the wrist camera may rise [m]."""
+    camera_offset: float = 0.070
+    """From the tool point to the camera, across the closing direction and on either side [m]."""
+    camera_size: tuple[float, float] = (0.094, 0.034)
+    """The camera along and across the closing direction, with a little play [m]."""
     tip_clearance: float = 0.0005
     """Height of the tips over what they stop on [m]."""
     margin: tuple[float, float] = (0.005, 0.008)
@@ -171,6 +181,12 @@ def _at_angle(
     result = np.zeros((*turned.shape[:2], 3), np.float32)
     for level in view.levels():
         view.add_grasps(level, result)
+    q = np.minimum(result[..., :1], 1)
+    along = _odd(SLIDE / cell)
+    # the worth over a few places, the fitted angle and opening weighted by it over a few more: cells are coarse
+    result[..., :1] = np.where(q > 0, cv2.blur(q, (1, along), borderType=cv2.BORDER_CONSTANT)[..., None], 0)
+    weighted = cv2.blur(np.dstack([q, q * result[..., 1:]]), (3, along), borderType=cv2.BORDER_CONSTANT)
+    result[..., 1:] = weighted[..., 1:] / np.maximum(weighted[..., :1], 1e-6)
     back = np.column_stack([R.T, -R.T @ offset])
     return np.asarray(cv2.warpAffine(result, back, (w, h), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP))
 
@@ -194,6 +210,14 @@ class _TurnedView:
         if self.top > hand.palm_clearance:
             along, across = hand.palm_size
             self.under_palm = _highest(self.height, _odd(across / cell), _odd(along / cell))
+        self.under_camera = None
+        if self.top > hand.camera_clearance:
+            along, across = hand.camera_size
+            under = _highest(self.height, _odd(across / cell), _odd(along / cell))
+            shift = min(round(hand.camera_offset / cell), len(under))
+            padded = np.pad(under, ((shift, shift), (0, 0)))
+            # the hand may come in either way round
+            self.under_camera = np.maximum(padded[: len(under)], padded[2 * shift :])
         self.columns = np.arange(label.shape[1], dtype=np.int32)
         self.rows = (np.arange(label.shape[0], dtype=np.float32) - label.shape[0] / 2)[:, None]
 
@@ -217,6 +241,8 @@ class _TurnedView:
         first, last = self._runs(slab)
         middle = (first + last) * 0.5
         candidate = (solid > 0) & ((last - first + 1) * cell <= hand.max_contact_width)
+        # the palm stops the hand at this level or lower down
+        candidate &= self.height - hand.reach < level + LEVEL_STEP / 2
         candidate &= np.abs(self.columns - middle) * cell < 3 * OFFSET_TOLERANCE
         r, c = np.nonzero(candidate)
         if not len(r):
@@ -261,17 +287,22 @@ class _TurnedView:
             lands = landing > wanted + LEVEL_STEP / 2
         if self.under_palm is not None:
             good &= self.under_palm[r, c] - tip <= hand.palm_clearance
-        q = np.where(lands, LANDING, 1.0) * good
+        if self.under_camera is not None:
+            good &= self.under_camera[r, c] - tip <= hand.camera_clearance
+        if not good.any():
+            return
+        r, c, a, run, margin, tip, lands = (x[good] for x in (r, c, a, run, margin, tip, lands))
 
-        edges = self._edges(solid, on_cloth, r, c, a)
+        edges = self._edges(solid, on_cloth, r, c)
+        q = np.where(lands, LANDING, 1.0)
         depth = edges.height - tip
         q *= (depth >= hand.min_depth) * (edges.steep > 0.7)
-        q *= np.clip(0.25 + 0.6 * (depth - 0.0012) / 0.0028, 0, 0.85) + np.clip((depth - 0.004) / 0.004, 0, 1) * 0.15
+        q *= np.clip(0.45 + 0.45 * (depth - hand.min_depth) / 0.002, 0, 0.9)
+        q *= 1 + 0.11 * np.clip((depth - hand.min_depth - 0.002) / 0.005, 0, 1)
         q *= np.clip(edges.length / FULL_CONTACT, 0, 1)
         q *= np.clip(1 - (edges.wedge / hand.friction_angle) ** 2, 0, 1)
-        half_bin = np.deg2rad(5.0)
-        q *= _bell(np.maximum(np.abs(edges.turn) - half_bin, 0) / ANGLE_TOLERANCE)
-        slant = self.finger * cell * np.abs(np.tan(np.clip(edges.turn, -half_bin, half_bin)))
+        q *= _bell(edges.turn / ANGLE_TOLERANCE)
+        slant = self.finger * cell * np.abs(np.tan(np.clip(edges.turn, -SLANT, SLANT)))
         q *= _bell(np.maximum(run - slant - edges.run, 0) / 2 / UNEVENNESS_TOLERANCE)
         q *= _bell((c - edges.middle) * cell / OFFSET_TOLERANCE)
         q *= np.clip(0.5 + 0.5 * (margin - 0.004) / 0.003, 0, 1)
@@ -302,7 +333,7 @@ class _TurnedView:
         right = np.where(b < n - 1, after[r, np.minimum(b + 1, n - 1)] - b - 1, n)
         return np.minimum(left, right) * self.cell
 
-    def _edges(self, solid: np.ndarray, on_cloth: bool, r: np.ndarray, c: np.ndarray, a: np.ndarray) -> _Edges:
+    def _edges(self, solid: np.ndarray, on_cloth: bool, r: np.ndarray, c: np.ndarray) -> _Edges:
         """Straight lines through both edges of the runs within the pad's width around cells (r, c)."""
         n_columns = solid.shape[1]
         first, last = self._runs(solid > 0)

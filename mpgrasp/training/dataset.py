@@ -1,16 +1,10 @@
 """Training shards in memory, and augmented batches from them.
 
-A shard is `shard_00000.npz` with, for n images of 224x224:
+A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each (n, 224, 224) in
+the units of labels.py, and `meta` (n, k), whose columns "meta_columns" in meta.json beside it names.
 
-    depth        uint16  0.05 mm units, 0 = no return
-    quality      uint8   1/255
-    angle        uint8   pi/256 from -pi/2, closing direction in the image (see grasp.py)
-    width        uint8   opening [px]
-    object_mask  uint8   0 support, 1 object
-    meta         float32 (n, k), columns named by "columns" in meta.json beside the shards
-
-Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16 bit units:
-half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
+Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16 bit
+units: half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
 """
 
 from __future__ import annotations
@@ -21,54 +15,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.depth import inpaint
 from mpgrasp.detectors.network_input import NetworkInput
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.training.augmentation import Augmentation, Sample, augment
+from mpgrasp.training.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
 
-DEPTH_UNIT = 5e-5
-"""[m]"""
-ANGLE_UNIT = np.pi / 256
-"""[rad]"""
-SCENE_COLUMN = "scene_seed"
+SCENE_COLUMN = "scene"
 """Images of one scene are either all held out or none."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Augmentation:
-    """Random changes to training images, with the labels changed to match."""
-
-    rotation: float = np.pi / 4
-    """Largest turn beside flips and quarter turns [rad]."""
-    zoom: tuple[float, float] = (0.85, 1.25)
-    """Magnification: the camera comes nearer or goes farther, heights stay as they are."""
-    warp_probability: float = 0.5
-    """Share of images that are turned and zoomed at all; flips and quarter turns are free of loss."""
-    offset: float = 0.01
-    """Largest shift of all depths [m]."""
-
-    def __post_init__(self) -> None:
-        if not 0 < self.zoom[0] <= self.zoom[1] or not 0 <= self.warp_probability <= 1:
-            raise ConfigError("unusable augmentation", got=self, allowed="0 < zoom, probability in [0, 1]")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sample:
-    """One image with dense labels, all (H, W)."""
-
-    depth: NDArray[np.float32]
-    """[m], holes filled."""
-    quality: NDArray[np.float32]
-    """[0, 1]"""
-    angle: NDArray[np.float32]
-    """[rad]"""
-    width: NDArray[np.float32]
-    """[px]"""
-    valid: NDArray[np.bool_]
-    """False where a turned image has no data."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,7 +69,9 @@ class GraspDataset:
         self.refresh()
         if not len(self.training):
             raise ConfigError(
-                "no training images", got=[str(d) for d in directories], allowed="directories with shard_*.npz"
+                "no training images",
+                got=[str(d) for d in directories],
+                allowed="directories with shard_*.npz",
             )
 
     def refresh(self) -> int:
@@ -151,14 +110,24 @@ class GraspDataset:
         """How many scenes the training images show."""
         return len(np.unique(self._scenes()[self.training]))
 
+    def description(self) -> list[dict[str, object]]:
+        """For each directory its name, how many shards were read, and what its meta.json tells of their making."""
+        about = []
+        for directory in self._directories:
+            meta = json.loads((directory / "meta.json").read_text())
+            shards = sum(p.parent == directory for p in self._seen)
+            told = {k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta}
+            about.append({"name": directory.name, "shards": shards, **told})
+        return about
+
     def sample(self, index: int) -> Sample:
         """Image `index` as it is."""
         shard, row = self._place[index]
         arrays = self._shards[shard]
         return Sample(
-            depth=arrays["depth"][row].astype(np.float32) * np.float32(DEPTH_UNIT),
-            quality=arrays["quality"][row].astype(np.float32) / 255,
-            angle=(arrays["angle"][row] * ANGLE_UNIT - np.pi / 2).astype(np.float32),
+            depth=np.nan_to_num(decode_depth(arrays["depth"][row])),
+            quality=arrays["quality"][row] * np.float32(QUALITY_UNIT),
+            angle=decode_angle(arrays["angle"][row]),
             width=arrays["width"][row].astype(np.float32),
             valid=np.ones(arrays["depth"][row].shape, bool),
         )
@@ -183,49 +152,6 @@ class GraspDataset:
         )
 
 
-def augment(sample: Sample, config: Augmentation, rng: np.random.Generator) -> Sample:
-    """The sample flipped, turned, zoomed and moved in depth at random; angles and widths go along."""
-    flip, quarters = bool(rng.integers(2)), int(rng.integers(4))
-    depth, quality, angle = sample.depth, sample.quality, sample.angle
-    width, valid = sample.width, sample.valid
-    maps = [depth, quality, angle, width, valid]
-    if flip:
-        maps = [m[:, ::-1] for m in maps]
-        maps[2] = -maps[2]
-    # both np.rot90 and image angles are counter-clockwise on screen
-    depth, quality, angle, width, valid = (np.rot90(m, quarters) for m in maps)
-    turned = Sample(
-        depth=depth + np.float32(rng.uniform(-config.offset, config.offset)),
-        quality=quality,
-        angle=angle + np.float32(quarters * np.pi / 2),
-        width=width,
-        valid=valid,
-    )
-    turn = rng.uniform(-config.rotation, config.rotation)
-    zoom = float(np.exp(rng.uniform(*np.log(config.zoom))))
-    return warp(turned, turn, zoom) if rng.uniform() < config.warp_probability else turned
-
-
-def warp(sample: Sample, turn: float, zoom: float) -> Sample:
-    """The sample turned by `turn` [rad], counter-clockwise on screen, and magnified by `zoom`, about its centre."""
-    rows, cols = sample.depth.shape
-    matrix = cv2.getRotationMatrix2D(((cols - 1) / 2, (rows - 1) / 2), np.rad2deg(turn), zoom)
-    # nearest pixels: anything else would mix depths across edges and angles across the wrap
-    stacked = np.dstack([sample.depth, sample.quality, sample.angle, sample.width])
-    moved = cv2.warpAffine(stacked, matrix, (cols, rows), flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_REFLECT)
-    valid = cv2.warpAffine(sample.valid.astype(np.uint8), matrix, (cols, rows), flags=cv2.INTER_NEAREST)
-    depth, quality, angle, width = np.moveaxis(moved, -1, 0)
-    middle = np.float32(np.median(sample.depth[::4, ::4]))
-    return Sample(
-        # a nearer camera sees the scene larger and every height as it was
-        depth=depth + middle * np.float32(1 / zoom - 1),
-        quality=quality,
-        angle=angle + np.float32(turn),
-        width=width * np.float32(zoom),
-        valid=valid > 0,
-    )
-
-
 def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
     """Which images to hold out: a hash of the scene decides, so that it stays when more shards come."""
     hashed = (scenes.astype(np.uint64) * np.uint64(2654435761)) % np.uint64(2**32)
@@ -235,7 +161,7 @@ def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
 def _read_columns(directory: Path, count: int) -> list[str]:
     path = directory / "meta.json"
     try:
-        columns = json.loads(path.read_text())["columns"]
+        columns = json.loads(path.read_text())["meta_columns"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"unreadable description of shards: {error!r}", got=str(path)) from error
     if not isinstance(columns, list) or len(columns) != count:
@@ -253,10 +179,10 @@ def _read_shard(path: Path) -> dict[str, np.ndarray]:
     if len(shape) != 3 or any(shard[k].shape != shape for k in ("quality", "angle", "width")):
         raise ConfigError("shard with maps of different sizes", got=str(path), allowed="all (n, H, W)")
     if shard["depth"].dtype != np.uint16 or len(shard["meta"]) != shape[0]:
-        raise ConfigError("shard of another format", got=str(path), allowed="uint16 depth, one meta row an image")
+        raise ConfigError(
+            "shard of another format", got=str(path), allowed="uint16 depth, one meta row an image"
+        )
     holes = np.flatnonzero((shard["depth"] == 0).any(axis=(1, 2)))
     for k in holes:
-        metres = shard["depth"][k].astype(np.float32) * np.float32(DEPTH_UNIT)
-        filled = inpaint(np.where(metres > 0, metres, np.nan).astype(np.float32))
-        shard["depth"][k] = np.rint(np.nan_to_num(filled) / DEPTH_UNIT).astype(np.uint16)
+        shard["depth"][k] = encode_depth(inpaint(decode_depth(shard["depth"][k])))
     return shard

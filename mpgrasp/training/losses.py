@@ -8,34 +8,11 @@ counts more than that of the many without, or a network short of training says z
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from mpgrasp.exceptions import ConfigError
-
-
-@dataclass(frozen=True, kw_only=True)
-class LossConfig:
-    """Weights of the parts."""
-
-    positive: float = 3.0
-    """Extra weight of a quality error at a pixel of label quality 1."""
-    background: float = 0.05
-    """Weight of cosine, sine and width where no grasp is labelled; 1 is the published code."""
-    beta: float = 0.2
-    """Error at which smooth-L1 turns from a parabola into a line; 1 is the published code."""
-    quality_weight: float = 1.0
-    """Weight of the quality against the angle and the width."""
-    width_weight: float = 1.0
-    """Weight of the width."""
-
-    def __post_init__(self) -> None:
-        weights = (self.positive, self.background, self.quality_weight, self.width_weight)
-        if min(weights) < 0 or self.beta <= 0:
-            raise ConfigError("unusable loss settings", got=self, allowed="weights from 0, beta above 0")
+from mpgrasp.training.trainer_config import LossConfig
 
 
 def grasp_loss(

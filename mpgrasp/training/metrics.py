@@ -24,13 +24,11 @@ MIN_IOU = 0.25
 GOOD = 0.5
 """A label is good when it has at least this share of the image's best label quality."""
 OPENING = (0.75, 1.5)
-"""An opening agrees when it is within these multiples of the label's: narrower hits the object, wider its neighbour."""
+"""An opening agrees when within these multiples of the label's: narrower hits the object, wider its neighbour."""
 SEARCH = 24
 """Labels farther than this from the best pixel are not compared as rectangles [px]."""
 JAW_SHARE = 0.5
 """Side of a rectangle, as a share of its opening; the published code's."""
-THIN = 0.012
-"""An image is of thin objects when its thickest object is no higher [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,10 +121,16 @@ def summarise(
 
 def _groups(dataset: GraspDataset) -> dict[str, NDArray[np.bool_]]:
     groups = {}
-    thickness, height = dataset.column("thickness"), dataset.column("camera_height")
-    if thickness is not None:
-        groups |= {"thin": thickness <= THIN, "thick": thickness > THIN}
+    thin, height = dataset.column("thin"), dataset.column("camera_height")
+    if thin is not None:
+        groups |= {"thin": thin > 0.5, "thick": thin <= 0.5}
     if height is not None:
         low, high = np.quantile(height, [1 / 3, 2 / 3])
         groups |= {"low": height <= low, "mid": (height > low) & (height <= high), "high": height > high}
     return groups
+
+
+def format_summary(summary: Mapping[str, float]) -> str:
+    """The summary in one line."""
+    rates = [f"{k} {v:.3f}" for k, v in summary.items() if not k.startswith("n")]
+    return "  ".join([f"n {summary.get('n', 0):.0f}", *rates])

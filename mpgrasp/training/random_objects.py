@@ -23,6 +23,8 @@ LONGEST = 0.2
 """Longest edge of a bounding box [m]."""
 DENSITY = (200.0, 1500.0)
 """[kg/m^3]"""
+LIGHTEST = 0.001
+"""[kg]"""
 LIKENESS = 0.15
 """A box whose three edges all lie within this share of an evaluation object's is drawn again."""
 THIN_HEIGHT = (0.002, 0.012)
@@ -46,12 +48,13 @@ def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectMode
         parts = _pick(rng, _THIN_FAMILIES if thin else _FAMILIES)(rng)
         density, friction, (r, g, b) = rng.uniform(*DENSITY), rng.uniform(0.4, 0.9), rng.uniform(0.15, 0.9, 3)
         size = np.ptp(np.vstack([part.points for part in parts]), axis=0)
-        if size.max() > LONGEST or resembles_evaluation_object(size):
+        mass = density * sum(part.volume for part in parts)
+        if size.max() > LONGEST or mass < LIGHTEST or resembles_evaluation_object(size):
             continue
         return ObjectModel(
             name=name,
             parts=tuple(parts),
-            mass=density * sum(part.volume for part in parts),
+            mass=mass,
             friction=friction,
             rgba=(float(r), float(g), float(b), 1.0),
             provenance="random",

@@ -1,0 +1,33 @@
+"""`python -m mpgrasp.training generate|train`: training data, and networks trained on them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from mpgrasp.exceptions import MpgraspError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a subcommand; returns the exit code, 2 for input that cannot be used."""
+    from mpgrasp.training import generate, train
+
+    parser = argparse.ArgumentParser(prog="python -m mpgrasp.training", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="generate|train")
+    for name, module in (("generate", generate), ("train", train)):
+        command = commands.add_parser(name, description=module.__doc__, help=module.main.__doc__)
+        module.add_arguments(command)
+        command.set_defaults(run=module.main)
+    args = parser.parse_args(argv)
+    try:
+        return int(args.run(args) or 0)
+    except MpgraspError as error:
+        print(f"mpgrasp.training: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

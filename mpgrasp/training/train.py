@@ -1,0 +1,119 @@
+"""`python -m mpgrasp.training train NAME --data DIR --out FILE`: train a network on generated shards."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from mpgrasp import paths
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.training.trainer_config import TrainConfig
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
+    defaults = TrainConfig(name="dhrnet")
+    loss, image = defaults.loss, defaults.input
+    add = parser.add_argument
+    add("name", help="network: dhrnet or ggcnn")
+    add("--data", type=Path, nargs="+", required=True, metavar="DIR", help="directories of shards")
+    add("--out", type=Path, metavar="FILE", help="weights file (default: the shipped one)")
+    add("--settings", default="{}", metavar="JSON", help="of the network, such as '{\"width\": 48}'")
+    add("--epochs", type=float, default=defaults.epochs, help="passes over the data (default: %(default)s)")
+    add("--minutes", type=float, help="time for everything, instead of epochs")
+    add("--batch", type=int, default=defaults.batch, help="images a step (default: %(default)s)")
+    add("--lr", type=float, default=defaults.lr, help="highest learning rate (default: %(default)s)")
+    add("--schedule", default=defaults.schedule, help="cosine or constant (default: %(default)s)")
+    add("--weight-decay", type=float, default=defaults.weight_decay, help="AdamW's (default: %(default)s)")
+    add("--average", type=float, default=defaults.average, help="decay of the averaged weights, 0 = none")
+    add("--positive", type=float, default=loss.positive, help="extra weight of labelled pixels' quality")
+    add("--background", type=float, default=loss.background, help="weight of angle and width elsewhere")
+    add("--beta", type=float, default=loss.beta, help="bend of smooth-L1 (default: %(default)s)")
+    add("--centre", default=image.centre, help="of the input's depth: mean or median (default: %(default)s)")
+    add("--scale", type=float, default=image.scale, help="input units a metre (default: %(default)s)")
+    add("--no-range", action="store_true", help="no second channel with the distance")
+    add("--no-augmentation", action="store_true", help="images as they are")
+    add(
+        "--thin-weight",
+        type=float,
+        default=defaults.thin_weight,
+        help="how much oftener thin scenes are drawn",
+    )
+    add("--holdout", type=float, default=defaults.holdout, help="share of scenes to validate on")
+    add("--seed", type=int, default=defaults.seed, help="of weights, order and augmentation")
+    add("--threads", type=int, help="threads for the network (default: all cores)")
+    add("--resume", action="store_true", help="continue from the checkpoint beside the weights file")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the command; returns the exit code. Ctrl-C keeps what was learnt so far.
+
+    Raises:
+        MpgraspError: unusable options, data or files.
+    """
+    config = config_from(args)
+    if args.threads is not None and args.threads < 1:
+        raise ConfigError("unusable number of threads", got=args.threads, allowed="1 or more")
+    import torch
+
+    from mpgrasp.training.dataset import GraspDataset
+    from mpgrasp.training.progress import ProgressLog
+    from mpgrasp.training.trainer import Trainer
+
+    if args.threads is not None:
+        torch.set_num_threads(args.threads)
+    out: Path = args.out or paths.WEIGHTS / f"{config.name}.safetensors"
+    dataset = GraspDataset(args.data, holdout=config.holdout)
+    trainer = Trainer(config, dataset, out)
+    with ProgressLog() as log:
+        resumed = args.resume and trainer.resume()
+        log.note(
+            f"{config.name}: {trainer.parameters / 1e6:.2f} M parameters, {len(dataset.training)} images of "
+            f"{dataset.scene_count} scenes to train on, {len(dataset.validation)} to validate on"
+            + (f"; resumed at step {trainer.step}" if resumed else "")
+        )
+        try:
+            best = trainer.run(log)
+        except KeyboardInterrupt:
+            trainer.save_checkpoint()
+            log.note(f"stopped at step {trainer.step}; continue with --resume")
+            return 130
+    print(json.dumps({"weights": str(out), "steps": trainer.step, "validation": best}))
+    return 0
+
+
+def config_from(args: argparse.Namespace) -> TrainConfig:
+    """The training's settings from the command line's.
+
+    Raises:
+        ConfigError: settings that cannot be used.
+    """
+    from mpgrasp.detectors.network_input import NetworkInput
+    from mpgrasp.training.augmentation import Augmentation
+    from mpgrasp.training.trainer_config import LossConfig
+
+    try:
+        settings: Any = json.loads(args.settings)
+    except json.JSONDecodeError as error:
+        raise ConfigError(f"settings are not JSON: {error}", got=args.settings) from error
+    if not isinstance(settings, dict):
+        raise ConfigError("settings are not a JSON object", got=args.settings, allowed='{"width": 48}')
+    return TrainConfig(
+        name=args.name,
+        settings=settings,
+        input=NetworkInput(centre=args.centre, scale=args.scale, range_channel=not args.no_range),
+        loss=LossConfig(positive=args.positive, background=args.background, beta=args.beta),
+        augmentation=None if args.no_augmentation else Augmentation(),
+        epochs=args.epochs,
+        minutes=args.minutes,
+        batch=args.batch,
+        lr=args.lr,
+        schedule=args.schedule,
+        weight_decay=args.weight_decay,
+        average=args.average,
+        thin_weight=args.thin_weight,
+        seed=args.seed,
+        holdout=args.holdout,
+    )

@@ -1,0 +1,89 @@
+"""Settings of a training run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mpgrasp.detectors.network_input import NetworkInput
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.training.augmentation import Augmentation
+
+TRAINABLE = ("dhrnet", "ggcnn")
+"""Networks that can be trained."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossConfig:
+    """Weights of the parts."""
+
+    positive: float = 3.0
+    """Extra weight of a quality error at a pixel of label quality 1."""
+    background: float = 0.05
+    """Weight of cosine, sine and width where no grasp is labelled; 1 is the published code."""
+    beta: float = 0.2
+    """Error at which smooth-L1 turns from a parabola into a line; 1 is the published code."""
+    quality_weight: float = 1.0
+    """Weight of the quality against the angle and the width."""
+    width_weight: float = 1.0
+    """Weight of the width."""
+
+    def __post_init__(self) -> None:
+        weights = (self.positive, self.background, self.quality_weight, self.width_weight)
+        if min(weights) < 0 or self.beta <= 0:
+            raise ConfigError("unusable loss settings", got=self, allowed="weights from 0, beta above 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """How to train."""
+
+    name: str
+    """Network, a key of `TRAINABLE`."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Of the network's config, beside its channels."""
+    input: NetworkInput = field(
+        default_factory=lambda: NetworkInput(centre="median", scale=20.0, range_channel=True)
+    )
+    """What the network sees."""
+    loss: LossConfig = field(default_factory=LossConfig)
+    augmentation: Augmentation | None = field(default_factory=Augmentation)
+    """None: images as they are."""
+    epochs: float = 50.0
+    """Passes over the data, where no minutes are given."""
+    minutes: float | None = None
+    """Time for everything, instead of epochs."""
+    batch: int = 32
+    """Images a step."""
+    lr: float = 1e-4
+    """Highest learning rate."""
+    schedule: str = "cosine"
+    """"cosine" down to a hundredth, or "constant"; either after a warm-up."""
+    weight_decay: float = 5e-2
+    """AdamW's."""
+    average: float = 0.998
+    """Decay per step of the running average of the weights; 0 saves the weights themselves."""
+    thin_weight: float = 1.0
+    """How much oftener images of thin objects are drawn."""
+    seed: int = 0
+    """Of initial weights, order and augmentation."""
+    holdout: float = 0.08
+    """Share of scenes for validation."""
+    validation_images: int = 384
+    """At most so many images are validated on."""
+    validate_every: float = 0.1
+    """Share of the budget between validations."""
+
+    def __post_init__(self) -> None:
+        if self.name not in TRAINABLE:
+            raise ConfigError("unknown network", got=self.name, allowed=TRAINABLE)
+        if self.schedule not in ("cosine", "constant"):
+            raise ConfigError("unknown schedule", got=self.schedule, allowed=("cosine", "constant"))
+        positive = (self.epochs, self.batch, self.lr, self.validate_every, self.thin_weight)
+        if min(positive) <= 0 or (self.minutes is not None and self.minutes <= 0):
+            raise ConfigError(
+                "unusable training settings", got=self, allowed="sizes, times and rates above 0"
+            )
+        if not 0 <= self.average < 1:
+            raise ConfigError("unusable running average", got=self.average, allowed="from 0 to below 1")
