@@ -20,7 +20,7 @@ from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.rasteriser import Rasteriser, require_gl
-from mpgrasp.ray_caster import ray_cast
+from mpgrasp.ray_caster import RayCaster
 from mpgrasp.sensor_noise import DepthNoise
 
 D435_INTRINSICS = CameraIntrinsics(fx=385.0, fy=385.0, cx=319.5, cy=239.5, width=640, height=480)
@@ -73,6 +73,7 @@ class WristCamera:
         self._camera = camera
         self._geom_groups = geom_groups
         self._seen = replace(self.intrinsics, width=self.intrinsics.width + margin)
+        self._ray_caster: RayCaster | None = None
         self._depth_rasteriser: Rasteriser | None = None
         self._colour_rasteriser: Rasteriser | None = None
 
@@ -129,7 +130,9 @@ class WristCamera:
 
     def _depth(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.float32]:
         if self.backend == "ray":
-            return ray_cast(self._model, data, self._seen, T_world_camera, self._geom_groups)
+            if self._ray_caster is None:
+                self._ray_caster = RayCaster(self._model, self._seen, geom_groups=self._geom_groups)
+            return self._ray_caster.render(data, T_world_camera)
         if self._depth_rasteriser is None:
             self._depth_rasteriser = Rasteriser(self._model, self._seen, geom_groups=self._geom_groups)
         return self._depth_rasteriser.render(data, T_world_camera)

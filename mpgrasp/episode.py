@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mpgrasp.camera import BACKENDS, WristCamera
-from mpgrasp.controllers.controller import Controller, Observation
+from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode_result import EpisodeResult, Outcome
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.execution import ExecutionConfig, ExecutionResult, execute_grasp
+from mpgrasp.execution import ExecutionConfig, execute_grasp
 from mpgrasp.geometry import FloatArray, invert, looking_down
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.ik import solve_pose
@@ -94,86 +94,124 @@ def run_episode(
         ConfigError: a scene that cannot be built.
         CameraError: a camera backend that this machine does not have.
     """
-    episode = _Episode(scene_config, seed, config or EpisodeConfig(), recorder or NullRecorder())
+    episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
     try:
-        return episode.play(detector, controller)
+        controller.reset(seed)
+        while episode.interruption() is None:
+            observation = episode.look()
+            with episode.timed("control"):
+                command = controller.update(observation)
+            episode.act(command, controller.diagnostics())
+            if command.done:
+                break
+        return episode.conclude(controller.final_grasp() if episode.interruption() is None else None)
     finally:
-        episode.camera.close()
+        episode.close()
 
 
-class _Episode:
-    """The pieces of one running episode."""
+class Episode:
+    """One attempt, taken tick by tick: look and act in turn, then conclude.
+
+    `run_episode` steps it with a controller, `mpgrasp.env` with whatever a learner decides.
+
+    Args:
+        scene_config: what is on the table.
+        seed: of the scene, the start pose and the sensor noise.
+        detector: is reset here, then asked at every look.
+        config: how the episode runs.
+        recorder: is shown every tick.
+    """
 
     def __init__(
-        self, scene_config: SceneConfig, seed: int, config: EpisodeConfig, recorder: Recorder
+        self,
+        scene_config: SceneConfig,
+        seed: int,
+        *,
+        detector: GraspDetector,
+        config: EpisodeConfig | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
-        self.config, self.seed, self.recorder = config, seed, recorder
+        self.config, self.seed, self.detector = config or EpisodeConfig(), seed, detector
+        self.recorder = recorder or NullRecorder()
         self.scene = build_scene(scene_config, seed)
         self.simulation = Simulation(self.scene)
         self.camera = WristCamera(
             self.scene.model,
-            config.camera_backend,
-            DepthNoise() if config.noise else None,
-            crop=config.camera_crop,
+            self.config.camera_backend,
+            DepthNoise() if self.config.noise else None,
+            crop=self.config.camera_crop,
         )
         self.simulation.set_q(self._start_q())
         self.driver = ArmDriver(self.simulation)
         self.start_time = self.simulation.time
         self.ticks = 0
+        self.frame: DepthFrame | None = None
+        """What the camera saw at the last look."""
+        self._grasp_map: GraspMap | None = None
         self._times: dict[str, list[float]] = defaultdict(list)
         self._last_record = -np.inf
         self._grasp: Grasp | None = None
-
-    def play(self, detector: GraspDetector, controller: Controller) -> EpisodeResult:
-        """Reach, grasp, judge."""
         self.recorder.start(self.simulation)
         detector.reset(self.scene.height_map())
-        controller.reset(self.seed)
-        outcome = self._reach(detector, controller)
+
+    def look(self) -> Observation:
+        """The view of this tick. Its noise depends on seed and tick alone: looking twice shows the same."""
+        rng = np.random.default_rng([self.seed, _NOISE_STREAM, self.ticks])
+        with self.timed("render"):
+            self.frame = self.camera.capture(self.simulation.data, rng)
+        with self.timed("detect"):
+            self._grasp_map = self.detector.predict(self.frame)
+        return Observation(
+            time=self.simulation.time - self.start_time,
+            T_world_tcp=self.simulation.T_world_tcp,
+            grasp_map=self._grasp_map,
+        )
+
+    def act(self, command: Command, diagnostics: Mapping[str, FloatArray | float | bool]) -> None:
+        """Do until the next tick what was commanded; nothing but the gripper moves where that is done."""
+        self.ticks += 1
+        self.simulation.open_gripper(command.gripper)
+        before = self.driver.statistics()
+        if not command.done:
+            self.driver.drive(command.twist, self.config.control_dt)
+            after = self.driver.statistics()
+            self._times["ik"].append(after.ik_seconds - before.ik_seconds)
+            self._times["physics"].append(after.physics_seconds - before.physics_seconds)
+        self._record("reach", self.frame, self._grasp_map, diagnostics)
+
+    def interruption(self) -> Outcome | None:
+        """What ended the reach before a grasp, if anything: reflex or timeout."""
+        if self.driver.reflex is not None:
+            return Outcome.REFLEX
+        late = self.simulation.time - self.start_time >= self.config.max_reach_time
+        return Outcome.TIMEOUT if late else None
+
+    def conclude(self, grasp: Grasp | None) -> EpisodeResult:
+        """Execute the grasp, unless the reach was interrupted, and judge."""
         reach = self.driver.statistics()
-        lifted: str | None = None
-        if outcome is None:
-            self._grasp = controller.final_grasp()
-            outcome = Outcome.NO_GRASP if self._grasp is None else None
-        if outcome is None and self._grasp is not None:
+        outcome, lifted = self.interruption(), None
+        if outcome is None and grasp is None:
+            outcome = Outcome.NO_GRASP
+        elif outcome is None and grasp is not None:
+            self._grasp = grasp
             execution = execute_grasp(
-                self.driver, self._grasp, self.config.execution, on_tick=self._record_execution
+                self.driver, grasp, self.config.execution, on_tick=self._record_execution
             )
-            outcome, lifted = _judge(execution), execution.lifted
+            outcome, lifted = Outcome(execution.outcome), execution.lifted
         assert outcome is not None
         self.recorder.finish(self._verdict(outcome))
         return self._result(outcome, lifted, reach)
 
-    def _reach(self, detector: GraspDetector, controller: Controller) -> Outcome | None:
-        """Control ticks until the controller is done; an outcome where the episode ends before."""
-        while self.simulation.time - self.start_time < self.config.max_reach_time:
-            rng = np.random.default_rng([self.seed, _NOISE_STREAM, self.ticks])
-            with self._timed("render"):
-                frame = self.camera.capture(self.simulation.data, rng)
-            with self._timed("detect"):
-                grasp_map = detector.predict(frame)
-            with self._timed("control"):
-                command = controller.update(
-                    Observation(
-                        time=self.simulation.time - self.start_time,
-                        T_world_tcp=self.simulation.T_world_tcp,
-                        grasp_map=grasp_map,
-                    )
-                )
-            self.ticks += 1
-            self.simulation.open_gripper(command.gripper)
-            before = self.driver.statistics()
-            if not command.done:
-                self.driver.drive(command.twist, self.config.control_dt)
-                after = self.driver.statistics()
-                self._times["ik"].append(after.ik_seconds - before.ik_seconds)
-                self._times["physics"].append(after.physics_seconds - before.physics_seconds)
-            self._record("reach", frame, grasp_map, controller.diagnostics())
-            if self.driver.reflex is not None:
-                return Outcome.REFLEX
-            if command.done:
-                return None
-        return Outcome.TIMEOUT
+    def close(self) -> None:
+        """Free the camera."""
+        self.camera.close()
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Count the wall time of the block to one of `STAGES`."""
+        clock = time.perf_counter()
+        yield
+        self._times[stage].append(time.perf_counter() - clock)
 
     def _start_q(self) -> FloatArray:
         """Arm posture that puts the camera over the jittered start, looking straight down."""
@@ -243,13 +281,3 @@ class _Episode:
                 event=None if driver.reflex is None else str(driver.reflex),
             )
         )
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        clock = time.perf_counter()
-        yield
-        self._times[stage].append(time.perf_counter() - clock)
-
-
-def _judge(execution: ExecutionResult) -> Outcome:
-    return Outcome(execution.outcome)

@@ -219,8 +219,8 @@ class DifferentialIK:
             T = self.pose(q)
             error = pose_error(T, T_world_tcp)
             # 10 cm and half a radian at a time keep the linearisation honest
-            lengths = [1.0, np.linalg.norm(error[:3]) / 0.1, np.linalg.norm(error[3:]) / 0.5]
-            target = integrate_pose(T, error, 1.0 / float(np.max(lengths)))
+            lengths = float(np.linalg.norm(error[:3])) / 0.1, float(np.linalg.norm(error[3:])) / 0.5
+            target = integrate_pose(T, error, 1.0 / max(1.0, *lengths))
             dq = self.step(q, target, dt, posture_rate=0.2 / dt).dq
             # what is left of the motion once the tool has arrived is the elbow's
             if np.linalg.norm(error) < tolerance and np.linalg.norm(dq) * dt < 1e-3:

@@ -188,13 +188,11 @@ class ReflexMonitor:
         if not behind and solution.residual_angle <= c.ik_residual_angle:
             return None
         # IK fell behind: name what held it back
-        if solution.blocked is not None and solution.blocked_joint is not None:
+        if solution.blocked is not None:
             return _reflex(
                 solution.blocked, time, solution.blocked_value, solution.blocked_bound,
-                joint=solution.blocked_joint, demanded=True,
+                joint=solution.blocked_joint, demanded=solution.blocked == "joint_velocity",
             )  # fmt: skip
-        if solution.blocked is not None:
-            return _reflex(solution.blocked, time, solution.blocked_value, solution.blocked_bound)
         if behind:
             return _reflex("tracking_position", time, solution.residual, c.ik_residual, demanded=True)
         return _reflex(

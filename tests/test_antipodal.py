@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from height_maps import Solid, height_map
+
 from mpgrasp.detectors.antipodal import HandGeometry, WorldGrasps, antipodal_grasps
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference
@@ -61,7 +61,7 @@ def test_two_boxes_closer_than_a_finger_are_not_grasped_between_them() -> None:
     pair = [Solid(x=0.5, y=s * 0.025, yaw=0.0, length=0.15, breadth=0.04, height=0.03) for s in (-1, 1)]
     assert not antipodal_grasps(height_map(*pair)).quality.any()
     apart = [Solid(x=0.5, y=s * 0.060, yaw=0.0, length=0.15, breadth=0.04, height=0.03) for s in (-1, 1)]
-    x, y, angle, _, quality = best(antipodal_grasps(height_map(*apart)))
+    _, y, angle, _, quality = best(antipodal_grasps(height_map(*apart)))
     assert quality > 0.7
     assert abs(abs(y) - 0.060) < 0.005
     assert line_angle_difference(angle, QUARTER) < np.deg2rad(5)
@@ -89,7 +89,14 @@ def test_rotating_the_scene_rotates_the_grasps(turn: float) -> None:
         for x, y, yaw, breadth in ((0.03, -0.05, 0.2, 0.03), (-0.04, 0.05, 1.0, 0.015)):
             c, s = np.cos(phi), np.sin(phi)
             solids.append(
-                Solid(x=0.5 + c * x - s * y, y=s * x + c * y, yaw=yaw + phi, length=0.08, breadth=breadth, height=0.02)
+                Solid(
+                    x=0.5 + c * x - s * y,
+                    y=s * x + c * y,
+                    yaw=yaw + phi,
+                    length=0.08,
+                    breadth=breadth,
+                    height=0.02,
+                )
             )
         return antipodal_grasps(height_map(*solids))
 
@@ -143,7 +150,9 @@ def test_what_lies_on_a_broad_slab_is_grasped_but_worth_less() -> None:
 
 def test_the_cells_size_changes_little() -> None:
     stick = Solid(x=0.5, y=0.0, yaw=0.5, length=0.08, breadth=0.025, height=0.015)
-    coarse, fine = (best(antipodal_grasps(height_map(stick, cell=cell, half_extent=0.1))) for cell in (0.002, 0.001))
+    coarse, fine = (
+        best(antipodal_grasps(height_map(stick, cell=cell, half_extent=0.1))) for cell in (0.002, 0.001)
+    )
     assert abs(coarse[4] - fine[4]) < 0.15
     assert line_angle_difference(coarse[2], fine[2]) < np.deg2rad(4)
 

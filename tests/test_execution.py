@@ -52,7 +52,7 @@ def grasp_of(
 
 
 @pytest.mark.parametrize("height", [0.008, 0.0045])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_thin_stick_on_an_uneven_cloth_is_lifted(height: float, seed: int) -> None:
     driver = driver_over(scene_with(stick(height), seed))
     phases: list[str] = []
@@ -81,6 +81,8 @@ def test_a_tall_block_is_gripped_as_deep_as_the_palm_allows_and_without_contact(
     top = result.planned_height + ExecutionConfig().palm_depth
     assert result.contact_height is None
     assert result.tip_height == pytest.approx(top - 0.042, abs=0.001)
+    # the forces of both pads cancel: what is left is the weight
+    assert driver.external_force == pytest.approx(9.81 * model.mass, abs=0.05)
 
 
 def test_the_start_may_be_below_the_pregrasp() -> None:

@@ -27,6 +27,8 @@ ROWS: dict[str, tuple[int, str]] = {
             "simulation",
             "rasteriser",
             "ray_caster",
+            "height_field_rays",
+            "convex_rays",
             "camera",
             "ik",
             "reflex",

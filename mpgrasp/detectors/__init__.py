@@ -1,7 +1,7 @@
 """Grasp detectors: a depth frame in, a grasp for every pixel out.
 
-`DETECTORS` names them all. "dhrnet" is the paper's network, "ggcnn" is GG-CNN2, trained here on the same data (the
-published GG-CNN and GG-CNN2 files load through `weights`), "oracle" reads the scene's true height map.
+`DETECTORS` names them all. "dhrnet" is the paper's network; "ggcnn" is GG-CNN2, trained here on the same data
+(the published GG-CNN and GG-CNN2 files load through `weights`); "oracle" reads the scene's true height map.
 Importing this package does not import torch; making a network detector does.
 """
 

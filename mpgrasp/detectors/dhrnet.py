@@ -1,9 +1,10 @@
 """DHRNet: a grasp network that keeps high resolution throughout and exchanges features between resolutions.
 
-The paper's Section III-B: a convolutional stem, four stages with one to four parallel branches of residual blocks,
-fuse layers between them (3x3 stride-2 convolutions down, bilinear up), and heads that see all branches (Fig. 9b).
-The layout of branches and fuse layers is HRNet's (Wang et al., https://arxiv.org/abs/1908.07919), which the authors'
-own code uses too: `DHRNetConfig(**AUTHORS)` has their 65.9 M parameters.
+The paper's Section III-B: a convolutional stem, four stages with one to four parallel branches of residual
+blocks, fuse layers between them (3x3 stride-2 convolutions down, bilinear up), and heads that see all
+branches (Fig. 9b). The layout of branches and fuse layers is HRNet's (Wang et al.,
+https://arxiv.org/abs/1908.07919), as in the authors' own code: `DHRNetConfig(**AUTHORS)` has its 65.8 M
+parameters.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from torch.nn import functional as F
 
 from mpgrasp.exceptions import ConfigError
 
+HEADS = ("pos", "cos", "sin", "width")
+"""Outputs; `<head>_output` in checkpoints."""
 BN_MOMENTUM = 0.1
 """The paper's Section IV-A."""
 EXPANSION = 4
@@ -50,12 +53,12 @@ class DHRNetConfig:
     stem_blocks: int = 1
     """Residual blocks of the first stage."""
     bottleneck: bool = False
-    """First stage of bottleneck blocks, four times as wide at their ends, instead of plain residual blocks."""
+    """First stage of bottleneck blocks, four times as wide at their ends, instead of residual ones."""
     head_width: int = 24
     """Channels into which the heads take all branches together."""
     fine_head: bool = True
-    """Heads at half of the input's resolution, with the stem's features of that resolution beside the branches'
-    (which begin at a quarter): thin objects are few pixels wide."""
+    """Heads at half of the input's resolution, with the stem's features of that resolution beside those of
+    the branches, which begin at a quarter: thin objects are few pixels wide."""
 
     def __post_init__(self) -> None:
         # JSON knows no tuples
@@ -89,12 +92,12 @@ class DHRNet(nn.Module):
             before = widths
         self.head = _AllBranches(before, c.head_width)
         self.fine = _conv_bn(c.head_width + c.stem_width, c.head_width, 3) if c.fine_head else None
-        for name in ("pos", "cos", "sin", "width"):
+        for name in HEADS:
             self.add_module(f"{name}_output", nn.Conv2d(c.head_width, 1, 1))
         for module in self.modules():
             if isinstance(module, nn.Conv2d):
                 nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
-        for name in ("pos", "cos", "sin", "width"):
+        for name in HEADS:
             # start near the mean of a sparse target, so that the first steps are not spent on the background
             nn.init.normal_(getattr(self, f"{name}_output").weight, std=0.01)
 
@@ -103,17 +106,12 @@ class DHRNet(nn.Module):
         branches = [self.stage1(self.stem_quarter(half))]
         for transition, stage in zip(self.transitions, self.stages, strict=True):
             branches = stage(transition(branches))
-        features = self.head(branches)  # (n, head_width, H/4, W/4)
+        features: Tensor = self.head(branches)  # (n, head_width, H/4, W/4)
         if self.fine is not None:
             features = self.fine(torch.cat([_resize(features, half), half], dim=1))
-        weight = torch.cat([h.weight for h in self._heads()])
-        bias = torch.cat([h.bias for h in self._heads()])
-        maps = _resize(F.conv2d(features, weight, bias).float(), x)  # (n, 4, H, W)
-        pos, cos, sin, width = maps.split(1, dim=1)
+        coarse = torch.cat([getattr(self, f"{head}_output")(features).float() for head in HEADS], dim=1)
+        pos, cos, sin, width = _resize(coarse, x).split(1, dim=1)  # of (n, 4, H, W)
         return pos, cos, sin, width
-
-    def _heads(self) -> list[nn.Conv2d]:
-        return [self.pos_output, self.cos_output, self.sin_output, self.width_output]
 
 
 def _resize(x: Tensor, like: Tensor) -> Tensor:
@@ -170,7 +168,7 @@ class _Transition(nn.Module):
 
 
 class _Module(nn.Module):
-    """Parallel branches of residual blocks, then a fuse layer that sums what each branch makes of all others."""
+    """Parallel branches of residual blocks, then a fuse layer: each sums what it makes of all others."""
 
     def __init__(self, widths: list[int], blocks: int) -> None:
         super().__init__()
@@ -186,6 +184,7 @@ class _Module(nn.Module):
         x = [branch(b) for branch, b in zip(self.branches, x, strict=True)]
         fused = []
         for target, sources in enumerate(self.fuse):
+            assert isinstance(sources, nn.ModuleList)
             total = x[target]
             for source, f in enumerate(sources):
                 if source != target:

@@ -1,8 +1,8 @@
 """A network as a grasp detector: depth image -> network -> grasp map.
 
-Post-processing follows the published code (https://github.com/dougsm/ggcnn and mvp_grasp): the quality is smoothed
-with 2 px, the angle and the width with 1 px. Cosine and sine of the doubled angle are smoothed before the angle is
-taken from them, because smoothed angles are wrong where they wrap.
+Post-processing follows the published code (https://github.com/dougsm/ggcnn, https://github.com/dougsm/mvp_grasp):
+the quality is smoothed with 2 px, the angle and the width with 1 px. Cosine and sine of the doubled angle are
+smoothed before the angle is taken from them, because smoothed angles are wrong where they wrap.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class NetworkDetector:
         """Start an episode; a network knows nothing but images, so `truth` is not looked at."""
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame's central square; quality is zero everywhere where the image says nothing."""
+        """Grasp map of the frame's central square; all quality is zero where the image says nothing."""
         crop = min(self.config.crop, *frame.depth.shape)
         image = crop_resize(frame, crop, self.weights.input.size)
         depth = inpaint(image.depth)

@@ -1,9 +1,9 @@
 """From a depth image without holes to what a network reads: the same in training and in the loop.
 
-The published GG-CNN code feeds depth minus its mean, in metres, clipped to +-1. A stick 4 mm high is then a step of
-0.004, below what a freshly initialised network reacts to, so that the residual can be scaled up; and on a crowded
-table the mean is no longer the table, so that the median can be taken instead. The residual hides how far away the
-scene is, and with that how many pixels the gripper can open: a second channel can tell.
+The published GG-CNN code feeds depth minus its mean, in metres, clipped to +-1. A stick 4 mm high is then a
+step of 0.004, below what a freshly initialised network reacts to: the residual can be scaled up. On a
+crowded table the mean is no longer the table: the median can be taken instead. And the residual hides how
+far away the scene is, and with that how many pixels the gripper can open: a second channel can tell.
 """
 
 from __future__ import annotations

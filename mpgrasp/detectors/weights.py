@@ -138,6 +138,9 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
         image = NetworkInput(**about["input"])
     except (OSError, SafetensorError, ConfigError, TypeError) as error:
         raise WeightsError(f"weights cannot be used: {error}", got=str(path)) from error
+    channels = about["settings"].get("channels", 1)
+    if channels != image.channels:
+        raise WeightsError("weights with a wrong number of channels", got=channels, allowed=str(image.channels))
     _load_state(network, state, path)
     return NetworkWeights(
         name=name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -48,20 +49,18 @@ class Sample:
 def augment(sample: Sample, config: Augmentation, rng: np.random.Generator) -> Sample:
     """The sample flipped, turned, zoomed and moved in depth at random; angles and widths go along."""
     flip, quarters = bool(rng.integers(2)), int(rng.integers(4))
-    depth, quality, angle = sample.depth, sample.quality, sample.angle
-    width, valid = sample.width, sample.valid
-    maps = [depth, quality, angle, width, valid]
-    if flip:
-        maps = [m[:, ::-1] for m in maps]
-        maps[2] = -maps[2]
+    offset = np.float32(rng.uniform(-config.offset, config.offset))
+
+    def moved(image: NDArray[Any]) -> NDArray[Any]:
+        return np.rot90(image[:, ::-1] if flip else image, quarters)
+
     # both np.rot90 and image angles are counter-clockwise on screen
-    depth, quality, angle, width, valid = (np.rot90(m, quarters) for m in maps)
     turned = Sample(
-        depth=depth + np.float32(rng.uniform(-config.offset, config.offset)),
-        quality=quality,
-        angle=angle + np.float32(quarters * np.pi / 2),
-        width=width,
-        valid=valid,
+        depth=moved(sample.depth) + offset,
+        quality=moved(sample.quality),
+        angle=moved(sample.angle) * np.float32(-1 if flip else 1) + np.float32(quarters * np.pi / 2),
+        width=moved(sample.width),
+        valid=moved(sample.valid),
     )
     turn = rng.uniform(-config.rotation, config.rotation)
     zoom = float(np.exp(rng.uniform(*np.log(config.zoom))))
@@ -69,7 +68,7 @@ def augment(sample: Sample, config: Augmentation, rng: np.random.Generator) -> S
 
 
 def warp(sample: Sample, turn: float, zoom: float) -> Sample:
-    """The sample turned by `turn` [rad], counter-clockwise on screen, and magnified by `zoom`, about the centre."""
+    """The sample turned by `turn` [rad], counter-clockwise on screen, and magnified about its centre."""
     rows, cols = sample.depth.shape
     matrix = cv2.getRotationMatrix2D(((cols - 1) / 2, (rows - 1) / 2), np.rad2deg(turn), zoom)
     # nearest pixels: anything else would mix depths across edges and angles across the wrap

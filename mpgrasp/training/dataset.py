@@ -1,10 +1,11 @@
 """Training shards in memory, and augmented batches from them.
 
-A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each (n, 224, 224) in
-the units of labels.py, and `meta` (n, k), whose columns "meta_columns" in meta.json beside it names.
+A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each (n, 224,
+224) in the units of labels.py, and `meta` (n, k), whose columns are the "meta_columns" of meta.json beside
+it.
 
-Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16 bit
-units: half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
+Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16
+bit units: half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +63,11 @@ class GraspDataset:
         self._directories = [Path(d) for d in directories]
         self._holdout = holdout
         self._seen: set[Path] = set()
+        self._told: dict[Path, dict[str, Any]] = {}
         self._shards: list[dict[str, np.ndarray]] = []
         self.columns: list[str] = []
         self.meta = np.zeros((0, 0), np.float32)
-        self.training = self.validation = np.zeros(0, np.intp)
+        self.training = self.held = np.zeros(0, np.intp)
         self._place = np.zeros((0, 2), np.intp)  # image -> (shard, row)
         self.refresh()
         if not len(self.training):
@@ -79,7 +82,12 @@ class GraspDataset:
         found = [p for d in self._directories for p in sorted(d.glob("shard_*.npz")) if p not in self._seen]
         for path in found:
             shard = _read_shard(path)
-            columns = _read_columns(path.parent, shard["meta"].shape[1])
+            self._told[path.parent] = told = _read_description(path.parent)
+            columns = told["meta_columns"]
+            if len(columns) != shard["meta"].shape[1]:
+                raise ConfigError(
+                    "shard and its description disagree", got=str(path), allowed=f"columns {columns}"
+                )
             if self._shards and columns != self.columns:
                 raise ConfigError("shards with different columns", got=columns, allowed=str(self.columns))
             self.columns = columns
@@ -91,7 +99,7 @@ class GraspDataset:
             self._shards.append(shard)
         if found:
             held = _held_out(self._scenes(), self._holdout)
-            self.training, self.validation = np.flatnonzero(~held), np.flatnonzero(held)
+            self.training, self.held = np.flatnonzero(~held), np.flatnonzero(held)
         return len(found)
 
     def __len__(self) -> int:
@@ -111,13 +119,12 @@ class GraspDataset:
         return len(np.unique(self._scenes()[self.training]))
 
     def description(self) -> list[dict[str, object]]:
-        """For each directory its name, how many shards were read, and what its meta.json tells of their making."""
-        about = []
-        for directory in self._directories:
-            meta = json.loads((directory / "meta.json").read_text())
-            shards = sum(p.parent == directory for p in self._seen)
-            told = {k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta}
-            about.append({"name": directory.name, "shards": shards, **told})
+        """For each directory its name, how many shards were read, and what its meta.json tells of them."""
+        about: list[dict[str, object]] = []
+        for directory, meta in self._told.items():
+            shards = sum(path.parent == directory for path in self._seen)
+            making: dict[str, object] = {k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta}
+            about.append({"name": directory.name, "shards": shards, **making})
         return about
 
     def sample(self, index: int) -> Sample:
@@ -158,15 +165,13 @@ def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
     return hashed / 2**32 < share
 
 
-def _read_columns(directory: Path, count: int) -> list[str]:
+def _read_description(directory: Path) -> dict[str, Any]:
     path = directory / "meta.json"
     try:
-        columns = json.loads(path.read_text())["meta_columns"]
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return {**told, "meta_columns": [str(name) for name in told["meta_columns"]]}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"unreadable description of shards: {error!r}", got=str(path)) from error
-    if not isinstance(columns, list) or len(columns) != count:
-        raise ConfigError("shards and their description disagree", got=columns, allowed=f"{count} columns")
-    return [str(c) for c in columns]
 
 
 def _read_shard(path: Path) -> dict[str, np.ndarray]:

@@ -1,8 +1,9 @@
-"""Training data: random scenes, their dense grasps, and noisy depth views from anywhere over the workspace.
+"""Training data: random scenes, their dense grasps, and noisy views from anywhere over the workspace.
 
-`python -m mpgrasp.training generate --scenes 2000 --out DIR` writes shards `shard_00000.npz` of `SHARD_SCENES`
-scenes each, `meta.json` that describes them and `sheet.png` to look at. A scene is a function of the seed and its
-index alone, so neither the number of workers nor an interruption changes a byte; finished shards are kept.
+`python -m mpgrasp.training generate --scenes 2000 --out DIR` writes shards `shard_00000.npz` of
+`SHARD_SCENES` scenes each, `meta.json` that describes them and `sheet.png` to look at. A scene is a function
+of the seed and its index alone, so neither the number of workers nor an interruption changes a byte;
+finished shards are kept.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import mujoco
 import numpy as np
 
 from mpgrasp.camera import BACKENDS, WristCamera
@@ -34,7 +36,7 @@ SHARD_SCENES = 20
 META_COLUMNS = (
     "camera_height", "scene", "max_thickness", "n_objects", "thin", "cloth_unevenness", "best_quality",
 )  # fmt: skip
-"""Columns of a shard's `meta`: camera over the table [m]; index of the scene; tallest point over the cloth [m];
+"""Columns of a shard's `meta`: camera over the table [m]; index of the scene; tallest point over cloth [m];
 objects in the scene; 1 if nothing rises above 13 mm; cloth's RMS [m]; best label quality in the view."""
 CAMERA_OVER_TCP = 0.0634
 """Height of the wrist camera over the tool point [m]."""
@@ -67,7 +69,9 @@ class GenerateConfig:
     def __post_init__(self) -> None:
         for name, least in (("scenes", 1), ("views", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise ConfigError(f"unusable number of {name}", got=getattr(self, name), allowed=f"{least} or more")
+                raise ConfigError(
+                    f"unusable number of {name}", got=getattr(self, name), allowed=f"{least} or more"
+                )
         if self.camera not in BACKENDS:
             raise ConfigError("unknown camera backend", got=self.camera, allowed=BACKENDS)
 
@@ -76,10 +80,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `python -m mpgrasp.training generate`."""
     parser.add_argument("--scenes", type=int, default=1000, help="number of scenes (default: %(default)s)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the shards go")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    parser.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the whole set (default: %(default)s)")
     parser.add_argument("--views", type=int, default=4, help="images of each scene (default: %(default)s)")
-    parser.add_argument("--camera", choices=BACKENDS, default="auto", help="depth backend (default: %(default)s)")
+    parser.add_argument(
+        "--camera", choices=BACKENDS, default="auto", help="depth backend (default: %(default)s)"
+    )
 
 
 def main(args: argparse.Namespace) -> int:
@@ -104,7 +112,14 @@ def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: b
     starts = range(0, config.scenes, SHARD_SCENES)
     jobs = [(config, range(s, min(s + SHARD_SCENES, config.scenes)), _shard_path(out, s)) for s in starts]
     waiting = [job for job in jobs if not job[2].is_file()]
-    columns = ("generate", BarColumn(), MofNCompleteColumn(), "shards", TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (
+        "generate",
+        BarColumn(),
+        MofNCompleteColumn(),
+        "shards",
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, disable=not progress) as bar:
         task = bar.add_task("generate", total=len(jobs), completed=len(jobs) - len(waiting))
         if workers == 1 or len(waiting) < 2:
@@ -130,8 +145,8 @@ def make_scene(seed: int, index: int) -> tuple[Scene, np.random.Generator]:
         scene_config, scene_seed = training_scene_config(rng), int(rng.integers(2**31))
         try:
             return build_scene(scene_config, scene_seed, robot=False), rng
-        except ConfigError:
-            continue  # these objects found no rest in their region: draw others
+        except (ConfigError, mujoco.FatalError):
+            continue  # found no rest in their region, or more contacts than memory for them: draw others
     raise ConfigError("no scene came to rest in 20 draws", got=f"seed {seed}, scene {index}")
 
 
@@ -176,7 +191,9 @@ def camera_pose(truth: HeightMap, rng: np.random.Generator) -> FloatArray:
     T = looking_down([*xy, height], rng.uniform(-np.pi, np.pi))
     tilt = np.clip(rng.normal(0, TILT, 2), -2 * TILT, 2 * TILT)
     # tilting about x and then, a quarter turn on, about y
-    T[:3, :3] = T[:3, :3] @ rotation_x(tilt[0]) @ rotation_z(np.pi / 2) @ rotation_x(tilt[1]) @ rotation_z(-np.pi / 2)
+    T[:3, :3] = (
+        T[:3, :3] @ rotation_x(tilt[0]) @ rotation_z(np.pi / 2) @ rotation_x(tilt[1]) @ rotation_z(-np.pi / 2)
+    )
     return T
 
 
@@ -202,7 +219,9 @@ def _prepare(config: GenerateConfig, out: Path) -> None:
         if path.is_file():
             there = json.loads(path.read_text(encoding="utf-8"))
             if there != description:
-                raise ConfigError("the directory holds other data", got=str(out), allowed="an empty directory")
+                raise ConfigError(
+                    "the directory holds other data", got=str(out), allowed="an empty directory"
+                )
             return
         path.write_text(json.dumps(description, indent=2) + "\n", encoding="utf-8")
     except (OSError, ValueError) as error:

@@ -33,7 +33,7 @@ class ViewLabels:
     quality: NDArray[np.uint8]
     """(H, W) in steps of `QUALITY_UNIT`."""
     angle: NDArray[np.uint8]
-    """(H, W) closing direction in the image in steps of `ANGLE_UNIT` from -pi/2; 128 (zero) where there is none."""
+    """(H, W) closing direction in the image in steps of `ANGLE_UNIT` from -pi/2; 128 (zero) where none is."""
     width: NDArray[np.uint8]
     """(H, W) opening [px]; 0 where there is none."""
     object_mask: NDArray[np.uint8]

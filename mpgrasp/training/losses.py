@@ -1,9 +1,10 @@
 """Smooth-L1 losses on the four heads, as in the published code, with two changes that sparse labels ask for.
 
-The published code regresses zeros for cosine, sine and width wherever there is no grasp. Here these three count in full
-only where a grasp is labelled and by `background` elsewhere: enough that smoothing does not mix in arbitrary values
-from beside an object, too little to pull the angles of thin objects towards zero. And the quality of labelled pixels
-counts more than that of the many without, or a network short of training says zero everywhere.
+The published code regresses zeros for cosine, sine and width wherever there is no grasp. Here these three
+count in full only where a grasp is labelled and by `background` elsewhere: enough that smoothing does not
+mix in arbitrary values from beside an object, too little to pull the angles of thin objects towards zero.
+And the quality of labelled pixels counts more than that of the many without, or a network short of training
+says zero everywhere.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Does a network's best grasp of an image agree with a label: densely, and by the grasp rectangle metric.
 
-Neither executes anything. A hit means that a labelled grasp lies where the network would grasp, in its direction.
+Neither executes anything. A hit means that a labelled grasp lies where the network would grasp, in its
+direction.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ MIN_IOU = 0.25
 GOOD = 0.5
 """A label is good when it has at least this share of the image's best label quality."""
 OPENING = (0.75, 1.5)
-"""An opening agrees when within these multiples of the label's: narrower hits the object, wider its neighbour."""
+"""An opening agrees within these multiples of the label's: narrower hits the object, wider its neighbour."""
 SEARCH = 24
 """Labels farther than this from the best pixel are not compared as rectangles [px]."""
 JAW_SHARE = 0.5
@@ -94,9 +95,9 @@ def _rectangle(row: int, col: int, theta: float, opening: float) -> GraspRectang
 def summarise(
     verdicts: Mapping[int, Verdict], graspable: Mapping[int, bool], dataset: GraspDataset
 ) -> dict[str, float]:
-    """Rates over images with a labelled grasp, for all and by group, and what is claimed where there is none.
+    """Rates over images with a labelled grasp, for all and by group; and what is claimed where there is none.
 
-    Keys: hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the same over
+    Keys: hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the same of
     images without any label), n; hit_<group> and n_<group> for thin, thick, low, mid and high cameras.
     """
     images = np.array([i for i in verdicts if graspable[i]], int)
@@ -120,7 +121,7 @@ def summarise(
 
 
 def _groups(dataset: GraspDataset) -> dict[str, NDArray[np.bool_]]:
-    groups = {}
+    groups: dict[str, NDArray[np.bool_]] = {}
     thin, height = dataset.column("thin"), dataset.column("camera_height")
     if thin is not None:
         groups |= {"thin": thin > 0.5, "thick": thin <= 0.5}

@@ -19,6 +19,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("name", help="network: dhrnet or ggcnn")
     add("--data", type=Path, nargs="+", required=True, metavar="DIR", help="directories of shards")
+    add(
+        "--validation",
+        type=Path,
+        nargs="+",
+        metavar="DIR",
+        help="directories to validate on (default: held out)",
+    )
     add("--out", type=Path, metavar="FILE", help="weights file (default: the shipped one)")
     add("--settings", default="{}", metavar="JSON", help="of the network, such as '{\"width\": 48}'")
     add("--epochs", type=float, default=defaults.epochs, help="passes over the data (default: %(default)s)")
@@ -65,13 +72,14 @@ def main(args: argparse.Namespace) -> int:
     if args.threads is not None:
         torch.set_num_threads(args.threads)
     out: Path = args.out or paths.WEIGHTS / f"{config.name}.safetensors"
-    dataset = GraspDataset(args.data, holdout=config.holdout)
-    trainer = Trainer(config, dataset, out)
+    separate = GraspDataset(args.validation, holdout=0) if args.validation else None
+    dataset = GraspDataset(args.data, holdout=0 if separate else config.holdout)
+    trainer = Trainer(config, dataset, out, separate)
     with ProgressLog() as log:
         resumed = args.resume and trainer.resume()
         log.note(
             f"{config.name}: {trainer.parameters / 1e6:.2f} M parameters, {len(dataset.training)} images of "
-            f"{dataset.scene_count} scenes to train on, {len(dataset.validation)} to validate on"
+            f"{dataset.scene_count} scenes to train on, {len(trainer.validation_images)} to validate on"
             + (f"; resumed at step {trainer.step}" if resumed else "")
         )
         try:

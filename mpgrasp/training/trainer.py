@@ -1,8 +1,9 @@
 """Training a network on shards, within a budget of epochs or minutes.
 
-Defaults are the paper's (Section IV-A): AdamW, learning rate 1e-4, weight decay 5e-2, batches of 32, 50 epochs. A
-budget of minutes can take the place of epochs; the learning rate is annealed over whichever is given. Convolutions
-run in bfloat16, images with channels last. What is validated and saved is a running average of the weights.
+Defaults are the paper's (Section IV-A): AdamW, learning rate 1e-4, weight decay 5e-2, batches of 32, 50
+epochs. A budget of minutes can take the place of epochs; the learning rate is annealed over whichever is
+given. Convolutions run in bfloat16, images with channels last. What is validated and saved is a running
+average of the weights.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from mpgrasp.detectors.network_detector import postprocess
 from mpgrasp.detectors.weights import WIDTH_PX, NetworkWeights, build_network, save_weights
@@ -39,11 +39,21 @@ CHECKPOINT_EVERY = 180.0
 
 
 class Trainer:
-    """One training run: steps, validation, checkpoints and the weights file `out`."""
+    """One training run: steps, validation, checkpoints and the weights file `out`.
 
-    def __init__(self, config: TrainConfig, dataset: GraspDataset, out: Path) -> None:
+    Validation images are all of `validation`, where there is one, and else what `dataset` holds out.
+    """
+
+    def __init__(
+        self,
+        config: TrainConfig,
+        dataset: GraspDataset,
+        out: Path,
+        validation: GraspDataset | None = None,
+    ) -> None:
         self.config = config
         self.dataset = dataset
+        self.validation = validation or dataset
         self.out = out
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         settings = {**config.settings, "channels": config.input.channels}
@@ -131,7 +141,7 @@ class Trainer:
         self.optimiser.step()
         self.step += 1
         self._update_average()
-        return {k: float(v) for k, v in parts.items()}
+        return {k: float(v.detach()) for k, v in parts.items()}
 
     def _next(self, loader: ThreadPoolExecutor, upcoming: Future[Batch]) -> tuple[Batch, Future[Batch]]:
         batch = upcoming.result()
@@ -180,28 +190,33 @@ class Trainer:
         if arrived:
             log.note(f"{arrived} more shards, {len(self.dataset.training)} training images")
 
+    @property
+    def validation_images(self) -> np.ndarray:
+        """Indices into `validation`, the same ones every time."""
+        data = self.validation
+        images = data.held if data is self.dataset else np.arange(len(data))
+        return np.random.default_rng(0).permutation(images)[: self.config.validation_images]
+
     @torch.inference_mode()
     def evaluate(self) -> dict[str, float]:
         """Validation of the averaged weights; see metrics.summarise."""
-        images = self.dataset.validation
-        if len(images) > self.config.validation_images:
-            images = np.random.default_rng(0).permutation(images)[: self.config.validation_images]
+        images = self.validation_images
         own = {k: v.clone() for k, v in self.network.state_dict().items()}
         self.network.load_state_dict(self.average)
         self.network.eval()
         verdicts, graspable = {}, {}
         for chunk in np.array_split(images, max(1, math.ceil(len(images) / 16))):
             for i, heads in zip(chunk.tolist(), self._heads(chunk), strict=True):
-                truth = self.dataset.sample(i)
+                truth = self.validation.sample(i)
                 verdicts[i] = judge(*postprocess(heads, WIDTH_PX), truth)
                 graspable[i] = bool(truth.quality.any())
         self.network.load_state_dict(own)
-        return summarise(verdicts, graspable, self.dataset)
+        return summarise(verdicts, graspable, self.validation)
 
     def _heads(self, images: np.ndarray) -> np.ndarray:
         if not len(images):
             return np.zeros((0, 4, 0, 0), np.float32)
-        batch = torch.from_numpy(self.dataset.batch(images, self.config.input).image).to(self.device)
+        batch = torch.from_numpy(self.validation.batch(images, self.config.input).image).to(self.device)
         with torch.autocast(self.device.type, torch.bfloat16):
             heads = self.network(batch.contiguous(memory_format=torch.channels_last))
         return torch.cat(heads, dim=1).float().cpu().numpy()
@@ -215,6 +230,7 @@ class Trainer:
         config = self.config
         return {
             "data": self.dataset.description(),
+            "validation_data": self.validation.description(),
             "training_images": len(self.dataset.training),
             "training_scenes": self.dataset.scene_count,
             "images_seen": self.step * config.batch,

@@ -1,0 +1,200 @@
+"""The reach as a gymnasium environment: a policy steers the wrist camera, MP-PC's rule picks the grasp.
+
+Importing this module registers `mpgrasp/Grasp-v0`: `gymnasium.make("mpgrasp.env:mpgrasp/Grasp-v0")`.
+World, noise, arm and verdict are those of `mpgrasp.episode`: with MP-PC's own actions an episode ends as in
+the benchmark. Reference: https://gymnasium.farama.org/api/env/
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike, NDArray
+
+from mpgrasp.bench.plugins import load_detector
+from mpgrasp.bench.suite import Suite, episode_seed, load_suite
+from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.controller import Command, Observation
+from mpgrasp.controllers.mppc import Mppc
+from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.episode import Episode, EpisodeConfig
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.film import Watcher
+from mpgrasp.grasp import GraspMap
+from mpgrasp.rasteriser import FAR
+
+ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
+"""What an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds, though
+it descends at half of the vertical one."""
+FIRST_TRAINING_EPISODE = 2**20
+"""A reset without a seed plays an episode of this number or above, which no benchmark reaches."""
+
+_REACH = 2.0  # [m], farther than the tool gets from the base
+_STEERED = [0, 1, 2, 5]  # components of a twist that an action sets
+
+Info = dict[str, Any]
+Observed = dict[str, NDArray[np.float32]]
+
+
+class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
+    """One grasp attempt per episode, one control tick (0.1 s) per step.
+
+    Action, (4,) in [-1, 1]: velocity of the tool point along world x, y, z and yaw rate, in units of
+    `ACTION_SCALE`; what exceeds the box is cut. No action grasps: when the tool has come down to z_min, the
+    best grasp of the pool B (Algorithm 1, line 17) is executed and judged within that last step.
+
+    Observation, float32: `depth` (224, 224) [m], the camera's central square, 0 where there was no return;
+    `quality` (224, 224), the detector's Q on the same pixels; `tcp` (3,) world position [m]; `yaw` (1,) of
+    the tcp's x axis [rad]; `time` (1,) since the start [s]. The last is the view before the grasp.
+
+    Reward: 1 for an object lifted, held and shaken, else 0. Every episode ends as terminated: a protective
+    stop or `max_reach_time`, which the policy sees coming in `time`, is a failure like any other.
+
+    Info: `scene_seed`; `mppc_action` (4,), what MP-PC would do now, to imitate or to compare with; after the
+    last step also `outcome`, `is_success`, `reflex` in words or "", and `result`, the `EpisodeResult`.
+
+    `reset(seed=k)` sets up episode k of the suite as the benchmark plays it with seed 0, whatever happened
+    before; without a seed, an episode drawn from `np_random`.
+
+    Args:
+        suite: name, path or declaration of what is on the table.
+        detector: registry name, `module:Class`, or a detector; grasps and `quality` are its.
+        config: how an episode runs; the suite's settings by default.
+        controller: settings of z_min, the pool and `mppc_action`.
+        render_mode: None or "rgb_array", a view of the whole scene.
+
+    Raises:
+        ConfigError, WeightsError: a suite, detector or setting that cannot be used.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.DISABLED}  # noqa: RUF012
+
+    def __init__(
+        self,
+        suite: str | Suite = "thin",
+        detector: str | GraspDetector = "oracle",
+        config: EpisodeConfig | None = None,
+        controller: MppcConfig | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ConfigError("unknown render mode", got=render_mode, allowed=self.metadata["render_modes"])
+        self.metadata = dict(self.metadata)  # vector environments write into it
+        self.render_mode = render_mode
+        self.suite = load_suite(suite) if isinstance(suite, str) else suite
+        self.detector = load_detector(detector) if isinstance(detector, str) else detector
+        self.config = config or self.suite.episode_config()
+        self.mppc = Mppc(controller)
+        start, z_min = self.config.start_height, self.mppc.config.z_min
+        if start <= z_min:
+            raise ConfigError("the reach would end where it begins", got=start, allowed=f"above {z_min} m")
+        image, latest = (NETWORK_SIZE, NETWORK_SIZE), self.config.max_reach_time + 2 * self.config.control_dt
+        self.action_space = spaces.Box(-1.0, 1.0, (len(ACTION_SCALE),), np.float32)
+        self.observation_space = spaces.Dict(  # type: ignore[assignment]
+            depth=spaces.Box(0.0, FAR, image, np.float32),
+            quality=spaces.Box(0.0, 1.0, image, np.float32),
+            tcp=spaces.Box(-_REACH, _REACH, (3,), np.float32),
+            yaw=spaces.Box(-np.float32(np.pi), np.float32(np.pi), (1,), np.float32),
+            time=spaces.Box(0.0, latest, (1,), np.float32),
+        )
+        self._episode: Episode | None = None
+        self._watcher: Watcher | None = None
+
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observed, Info]:
+        """Set up the episode of that number; there are no options."""
+        super().reset(seed=seed)
+        self.close()
+        number = int(self.np_random.integers(FIRST_TRAINING_EPISODE, 2**31)) if seed is None else seed
+        scene, scene_seed = self.suite.scene_config(number), episode_seed(self.suite.name, 0, number)
+        self._episode = Episode(scene, scene_seed, detector=self.detector, config=self.config)
+        self._over = False
+        self.mppc.reset(scene_seed)
+        return self._look(self._episode)
+
+    def step(self, action: ArrayLike) -> tuple[Observed, float, bool, bool, Info]:
+        """Move for one control tick, look, and at z_min grasp.
+
+        Raises:
+            ConfigError: an action that is not four finite numbers.
+            gymnasium.error.ResetNeeded: there is no episode, or it is over.
+        """
+        episode = self._episode
+        if episode is None or self._over:
+            raise gymnasium.error.ResetNeeded("there is no episode, or it is over: call reset() first")
+        episode.act(Command(twist=_twist(action), gripper=self.mppc.config.gripper_open), {})
+        observed, info = self._look(episode)
+        interrupted = episode.interruption() is not None
+        self._over = interrupted or self._command.done
+        if not self._over:
+            return observed, 0.0, False, False, info
+        if not interrupted:
+            episode.act(self._command, {})
+        result = episode.conclude(None if interrupted else self.mppc.final_grasp())
+        info |= {"outcome": result.outcome.value, "is_success": result.success}
+        info |= {"reflex": str(result.reflex or ""), "result": result}
+        return observed, float(result.success), True, False, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Colour picture (312, 352, 3) of the scene as it is now, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("there is nothing to see: call reset() first")
+        self._watcher = self._watcher or Watcher(self._episode.scene.model, self.config.camera_backend)
+        return self._watcher.picture(self._episode.simulation.data)
+
+    def close(self) -> None:
+        """Free cameras and the episode."""
+        for item in (self._episode, self._watcher):
+            if item is not None:
+                item.close()
+        self._episode = self._watcher = None
+
+    def _look(self, episode: Episode) -> tuple[Observed, Info]:
+        view = episode.look()
+        with episode.timed("control"):
+            self._command = self.mppc.update(view)
+        assert episode.frame is not None
+        action = np.clip(self._command.twist[_STEERED] / ACTION_SCALE, -1, 1).astype(np.float32)
+        return _observed(episode.frame, view), {"scene_seed": episode.seed, "mppc_action": action}
+
+
+def _twist(action: ArrayLike) -> NDArray[np.float64]:
+    """Twist (6,) [m/s, rad/s] of an action (4,)."""
+    action = np.asarray(action, float)
+    if action.shape != (len(ACTION_SCALE),) or not np.isfinite(action).all():
+        raise ConfigError("unusable action", got=action.tolist(), allowed="4 finite numbers in [-1, 1]")
+    twist = np.zeros(6)
+    twist[_STEERED] = np.clip(action, -1, 1) * ACTION_SCALE
+    return twist
+
+
+def _observed(frame: DepthFrame, view: Observation) -> Observed:
+    image = crop_resize(frame, min(CROP, *frame.depth.shape))
+    T = view.T_world_tcp
+    return {
+        "depth": np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32),
+        "quality": _quality_on(image, view.grasp_map),
+        "tcp": T[:3, 3].astype(np.float32),
+        "yaw": np.array([np.arctan2(T[1, 0], T[0, 0])], np.float32),
+        "time": np.array([view.time], np.float32),
+    }
+
+
+def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
+    """Quality on the pixels of `image`, whatever the crop and size of the detector's own; 0 beyond them."""
+    to, own, quality = image.intrinsics, view.intrinsics, np.nan_to_num(view.quality)
+    if own != to:
+        u = (np.arange(to.width, dtype=np.float32) - to.cx) / to.fx * own.fx + own.cx
+        v = (np.arange(to.height, dtype=np.float32) - to.cy) / to.fy * own.fy + own.cy
+        quality = np.asarray(cv2.remap(quality, *np.meshgrid(u, v), interpolation=cv2.INTER_LINEAR))
+    return np.clip(quality, 0.0, 1.0).astype(np.float32)
+
+
+gymnasium.register(id="mpgrasp/Grasp-v0", entry_point="mpgrasp.env:GraspEnv")
