@@ -7,7 +7,7 @@ greatest one of the faces turned away.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -33,7 +33,7 @@ class Solid:
     """(k, 4) as (n, d): n . x <= d, unit normals [-], distances [m]."""
     scale: FloatArray | None = None
     """(3,) with |scale (x - centre)| <= 1 [1/m], 0 along a tube; None for a polyhedron."""
-    centre: FloatArray | None = None
+    centre: FloatArray = field(default_factory=lambda: np.zeros(3))
     """(3,) [m]."""
 
     def inverse_depth(
@@ -47,8 +47,8 @@ class Solid:
             rays: (3, n) directions of unit z.
 
         Returns:
-            (n,) inverse depth [1/m] where the rays enter, inf for a start within, and (n,) where they leave. A
-            ray meets the solid if that is positive, and no less where it enters than where it leaves.
+            (n,) inverse depth [1/m] where the rays enter, inf for a start within, and (n,) where they leave.
+            A ray meets the solid if it enters at a positive one, no less than that where it leaves.
         """
         distance = self.planes[:, 3] - self.planes[:, :3] @ origin
         # a start on a face's plane sees that face edge-on: a huge slope stands for the infinite one
@@ -67,18 +67,17 @@ class Solid:
 
 def solids(model: mujoco.MjModel, geom: int) -> tuple[Solid, ...]:
     """Convex solids that make up a geom, in its frame; none if it is not made up of such."""
-    kind, size = model.geom_type[geom], model.geom_size[geom].astype(float)
-    centre = np.zeros(3)
+    kind, size = _TYPE(int(model.geom_type[geom])), model.geom_size[geom].astype(float)
     if kind == _TYPE.mjGEOM_BOX:
         return (Solid(planes=np.column_stack([_BOX, np.tile(size, 2)])),)
     if kind == _TYPE.mjGEOM_SPHERE:
-        return (_ball(np.full(3, size[0]), centre),)
+        return (_ball(np.full(3, size[0]), np.zeros(3)),)
     if kind == _TYPE.mjGEOM_ELLIPSOID:
-        return (_ball(size, centre),)
+        return (_ball(size, np.zeros(3)),)
     if kind in (_TYPE.mjGEOM_CYLINDER, _TYPE.mjGEOM_CAPSULE):
         radius, half = size[:2]
         ends = np.column_stack([_DISC, np.full(2, half)])
-        tube = Solid(planes=ends, scale=np.array([1 / radius, 1 / radius, 0.0]), centre=centre)
+        tube = Solid(planes=ends, scale=np.array([1 / radius, 1 / radius, 0.0]))
         if kind == _TYPE.mjGEOM_CYLINDER:
             return (tube,)
         return tube, *(_ball(np.full(3, radius), end * half) for end in _DISC)
@@ -96,8 +95,9 @@ def _round(
 ) -> tuple[FloatArray, FloatArray]:
     """Inverse depths (n,) where rays enter and leave an ellipsoid or tube about the origin."""
     p, d = scale * start, (scale[:, None] * rotation) @ rays.astype(float)
-    a, b, c = np.einsum("in,in->n", d, d), p @ d, p @ p - 1
-    c = c if abs(c) > _TINY else _TINY
+    a, b, c = np.einsum("in,in->n", d, d), p @ d, float(p @ p - 1)
+    if abs(c) < _TINY:
+        c = _TINY
     square = b * b - a * c
     root = np.sqrt(np.maximum(square, 0))
     leave = (-b - root) / c

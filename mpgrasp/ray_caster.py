@@ -88,7 +88,7 @@ class RayCaster:
         self._solids = [solids(model, geom) for geom in range(model.ngeom)]
 
     def render(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.float32]:
-        """Z-depth (H, W) [m] seen by an OpenCV camera at `T_world_camera` (4, 4); NaN where nothing is met."""
+        """Z-depth (H, W) [m] seen by an OpenCV camera at `T_world_camera` (4, 4), NaN where none."""
         model = self._model
         shape = (self._intrinsics.height, self._intrinsics.width)
         inverse = np.zeros(shape, np.float32)
