@@ -136,8 +136,8 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         if not interrupted:
             episode.act(self._command, {})
         result = episode.conclude(None if interrupted else self.mppc.final_grasp())
-        info |= {"outcome": result.outcome.value, "is_success": result.success}
-        info |= {"reflex": str(result.reflex or ""), "result": result}
+        info |= {"outcome": result.outcome.value, "is_success": result.success, "result": result}
+        info["reflex"] = str(result.reflex or "")
         return observed, float(result.success), True, False, info
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
@@ -191,9 +191,9 @@ def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
     """Quality on the pixels of `image`, whatever the crop and size of the detector's own; 0 beyond them."""
     to, own, quality = image.intrinsics, view.intrinsics, np.nan_to_num(view.quality)
     if own != to:
-        u = (np.arange(to.width, dtype=np.float32) - to.cx) / to.fx * own.fx + own.cx
-        v = (np.arange(to.height, dtype=np.float32) - to.cy) / to.fy * own.fy + own.cy
-        quality = np.asarray(cv2.remap(quality, *np.meshgrid(u, v), interpolation=cv2.INTER_LINEAR))
+        v, u = np.indices((to.height, to.width)).astype(float)
+        at = own.project(to.deproject(u, v, np.ones(u.shape))).astype(np.float32)  # (224, 224, 2)
+        quality = np.asarray(cv2.remap(quality, at[..., 0], at[..., 1], cv2.INTER_LINEAR))
     return np.clip(quality, 0.0, 1.0).astype(np.float32)
 
 

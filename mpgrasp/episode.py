@@ -20,7 +20,8 @@ from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode_result import EpisodeResult, Outcome
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.execution import ExecutionConfig, execute_grasp
+from mpgrasp.execution import execute_grasp
+from mpgrasp.execution_config import ExecutionConfig
 from mpgrasp.geometry import FloatArray, invert, looking_down
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.ik import solve_pose

@@ -83,7 +83,8 @@ def height_field_depth(
         return np.full(shape, np.inf, np.float32), np.ones(shape, bool)
     tri = _triangles(model, field)
     per_x, per_y = (tri.cols - 1) / (2 * half_x), (tri.rows - 1) / (2 * half_y)
-    u0, v0, z0 = np.float32([(origin[0] + half_x) * per_x, (origin[1] + half_y) * per_y, origin[2]])
+    u0, v0 = np.float32((origin[0] + half_x) * per_x), np.float32((origin[1] + half_y) * per_y)
+    z0 = np.float32(origin[2])
     du, dv = dx * np.float32(per_x), dy * np.float32(per_y)
 
     slope = np.sqrt(np.max((tri.along * per_x) ** 2 + (tri.across * per_y) ** 2))

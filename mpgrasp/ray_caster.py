@@ -119,11 +119,9 @@ class RayCaster:
         inverse[among_all] = 0  # MuJoCo sees everything there
         self._ask(inverse, among_all, data, T_world_camera, fixed=True)
         inverse[inverse < 1 / FAR] = np.nan
-        return 1 / inverse
+        return np.divide(1, inverse, out=inverse)
 
-    def _ask(
-        self, inverse: NDArray[np.float32], where: Mask, data: mujoco.MjData, T: FloatArray, *, fixed: bool
-    ) -> None:
+    def _ask(self, inverse: Image, where: Mask, data: mujoco.MjData, T: FloatArray, *, fixed: bool) -> None:
         """Have MuJoCo cast the rays of some pixels, at moving geoms or at `fixed` ones too."""
         if not where.any():
             return
@@ -154,13 +152,11 @@ class RayCaster:
             ahead = points[..., 2] >= NEAR * (1 - 1e-9)
             u = i.fx * points[..., 0] / points[..., 2] + i.cx
             v = i.fy * points[..., 1] / points[..., 2] + i.cy
-        for k, geom in enumerate(geoms):
-            if model.geom_type[geom] == _PLANE:
-                yield int(geom), (slice(0, i.height), slice(0, i.width))
-            elif ahead[k].any():
-                rows, cols = _span(v[k, ahead[k]], i.height), _span(u[k, ahead[k]], i.width)
-                if rows.start < rows.stop and cols.start < cols.stop:
-                    yield int(geom), (rows, cols)
+        spans = np.column_stack([*_span(v, ahead, i.height), *_span(u, ahead, i.width)])
+        spans[model.geom_type[geoms] == _PLANE] = (0, i.height, 0, i.width)
+        for geom, (top, bottom, left, right) in zip(geoms.tolist(), spans.tolist(), strict=True):
+            if top < bottom and left < right:
+                yield geom, (slice(top, bottom), slice(left, right))
 
 
 def ray_cast(
@@ -205,7 +201,7 @@ def _height_field(
     depth, unknown = height_field_depth(model, field, origin, (x, y, z))
     unknown |= depth < NEAR
     depth[unknown] = np.inf
-    return 1 / depth, unknown
+    return np.divide(1, depth, out=depth), unknown
 
 
 def mujoco_rays(
@@ -258,7 +254,9 @@ def _pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
     return np.ascontiguousarray(np.moveaxis(intrinsics.deproject(u, v, np.ones(u.shape)), -1, 0))
 
 
-def _span(at: FloatArray, size: int) -> slice:
-    """Pixels of a row or column of `size` between the least and the greatest of some positions."""
-    low, high = np.clip([at.min(), at.max()], -_MARGIN - 1, size + _MARGIN)
-    return slice(max(int(np.floor(low)) - _MARGIN, 0), min(int(np.ceil(high)) + _MARGIN + 1, size))
+def _span(at: FloatArray, counts: Mask, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and one past the last of `size` pixels between the positions (n, m) that count, (n,) each."""
+    low = np.min(at, axis=1, where=counts, initial=size + _MARGIN)
+    high = np.max(at, axis=1, where=counts, initial=-1 - _MARGIN)
+    first = np.clip(np.floor(low) - _MARGIN, 0, size)
+    return first.astype(np.int64), np.clip(np.ceil(high) + _MARGIN + 1, 0, size).astype(np.int64)

@@ -308,6 +308,67 @@ def test_unknown_backends_cameras_and_crops_are_refused(world) -> None:
         WristCamera(model, "ray", camera="head").true_frame(data)
 
 
+STEEP = looking_down([0.02, 0.01, 0.2], 0.9)
+GRAZING = look_at([0.45, 0.1, 0.05], [0, 0, 0])
+ASIDE = look_at([0.5, -0.5, 0.3], [0.2, -0.2, 0.02])
+INSIDE = look_at([0.0, 0.0, 0.035], [0.1, 0.1, 0.02])  # within the box
+UNDER = look_at([0.1, 0.1, -0.08], [0.0, 0.0, 0.1], x_axis=(0, 1, 0))
+OVER_THE_BALL = looking_down([0.1, 0.1, 0.075], 0.2)  # the near plane cuts it
+OVER_THE_DRUM = looking_down([0.1, -0.1, 0.16], 0.2)
+
+
+@pytest.mark.parametrize("pose", [*POSES, STEEP, GRAZING, ASIDE, INSIDE, UNDER, OVER_THE_BALL, OVER_THE_DRUM])
+@pytest.mark.parametrize("groups", [(0, 1, 2), (3,)])
+def test_all_at_once_rays_meet_what_single_rays_of_mujoco_meet(world, pose, groups) -> None:
+    model, data = world
+    quick = ray_cast(model, data, SMALL, pose, groups)
+    single = cast_rays(model, data, SMALL, pose, groups).depth
+    # a ray that touches an edge may fall on either side of it
+    off_edges = ~_edges(single)
+    np.testing.assert_array_equal(np.isnan(quick)[off_edges], np.isnan(single)[off_edges])
+    np.testing.assert_allclose(quick[off_edges], single[off_edges], atol=2e-6)
+    assert np.mean(~np.isclose(quick, single, atol=2e-6, equal_nan=True)) < 2e-4
+
+
+@pytest.mark.parametrize("height", [0.0, 0.002, 0.02, 0.2])
+@pytest.mark.parametrize("euler", ["0 0 0", "20 -10 30", "-70 0 15"])
+def test_a_height_field_of_any_pose_and_steepness_is_met_where_single_rays_meet_it(height, euler) -> None:
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><hfield name="h" nrow="31" ncol="45" size=".2 .15 {height or 1} .01"/></asset>'
+        f'<worldbody><geom type="hfield" hfield="h" pos=".03 -.02 .01" euler="{euler}"/></worldbody></mujoco>'
+    )
+    bumps = cv2.GaussianBlur(np.random.default_rng(1).random((31, 45)), (0, 0), 2)
+    model.hfield_data[:] = ((bumps - bumps.min()) / np.ptp(bumps)).ravel() * (height > 0)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for pose in (*POSES, GRAZING, UNDER):
+        quick, single = ray_cast(model, data, SMALL, pose), cast_rays(model, data, SMALL, pose).depth
+        wrong = ~np.isclose(quick, single, atol=2e-6, equal_nan=True)
+        assert wrong.mean() < 2e-4, (pose, wrong.sum())
+
+
+def test_dents_holes_and_clear_materials_are_seen_as_mujoco_sees_them() -> None:
+    tetrahedra = "0 0 0 .1 0 0 0 .1 0 0 0 .1"
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><asset><material name="clear" rgba="1 1 1 0"/><material name="blue" rgba="0 0 1 1"/>'
+        '<mesh name="dented" vertex="-.1 -.1 0 .1 -.1 0 .1 .1 0 -.1 .1 0 0 0 .03 0 0 .1" '
+        'face="0 1 4 1 2 4 2 3 4 3 0 4 1 0 5 2 1 5 3 2 5 0 3 5"/>'
+        f'<mesh name="convex" vertex="{tetrahedra}"/></asset><worldbody>'
+        '<geom type="plane" size=".3 .2 .1" pos="0 0 -.1" euler="3 4 5"/>'
+        '<geom type="sphere" size=".02" pos=".1 .1 .3" material="clear"/>'
+        '<geom type="sphere" size=".02" pos="-.1 .1 .2" material="blue" rgba="1 0 0 0"/>'
+        '<body pos=".1 -.1 0" euler="170 10 30"><freejoint/><geom type="mesh" mesh="dented" mass="1"/></body>'
+        '<body pos="-.1 -.1 .1" euler="0 40 0"><freejoint/><geom type="mesh" mesh="convex"/></body>'
+        "</worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for pose in (*POSES, UNDER, ASIDE):
+        quick, single = ray_cast(model, data, SMALL, pose), cast_rays(model, data, SMALL, pose).depth
+        wrong = ~np.isclose(quick, single, atol=2e-6, equal_nan=True)
+        assert wrong.mean() < 2e-4, (pose, wrong.sum())
+
+
 def test_rays_meet_a_box_where_geometry_says(world) -> None:
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><geom type="box" size=".1 .08 .05" pos="0 0 .05"/></worldbody></mujoco>'

@@ -70,6 +70,12 @@ def start(seed: int, **changes: object) -> Episode:
     return Episode(SCENE, seed, detector=Blind(), config=replace(EpisodeConfig(), **changes))  # type: ignore[arg-type]
 
 
+def depth_of(episode: Episode) -> np.ndarray:
+    episode.look()
+    assert episode.frame is not None
+    return episode.frame.depth
+
+
 @pytest.fixture(scope="module")
 def oracle() -> object:
     return make_detector("oracle")
@@ -78,9 +84,7 @@ def oracle() -> object:
 def test_the_same_seed_gives_the_same_record_but_for_timing(oracle) -> None:
     records = []
     for _ in range(2):
-        result = run_episode(
-            SCENE, 0, detector=oracle, controller=make_controller("mppc"), config=QUICK
-        )
+        result = run_episode(SCENE, 0, detector=oracle, controller=make_controller("mppc"), config=QUICK)
         records.append({k: v for k, v in result.as_record().items() if k != "timing"})
     assert records[0] == records[1]
     assert records[0]["success"] is True
@@ -107,22 +111,19 @@ def test_scene_start_and_noise_are_the_same_whatever_the_detector(oracle) -> Non
 
 def test_noise_changes_from_tick_to_tick_but_not_between_looks_of_one_tick() -> None:
     episode = start(3)
-    first, again = (episode.look() and episode.frame for _ in range(2))
+    first, again = depth_of(episode), depth_of(episode)
     episode.ticks += 1
-    second = episode.look() and episode.frame
-    assert first is not None and again is not None and second is not None
-    np.testing.assert_array_equal(first.depth, again.depth)
-    assert not np.array_equal(first.depth, second.depth, equal_nan=True)
+    second = depth_of(episode)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, second, equal_nan=True)
     episode.close()
 
 
 def test_without_noise_a_tick_repeats_itself() -> None:
     episode = start(3, noise=False)
-    first = episode.look() and episode.frame
+    first = depth_of(episode)
     episode.ticks += 1
-    second = episode.look() and episode.frame
-    assert first is not None and second is not None
-    np.testing.assert_array_equal(first.depth, second.depth)
+    np.testing.assert_array_equal(first, depth_of(episode))
     episode.close()
 
 

@@ -39,7 +39,7 @@ ROWS: dict[str, tuple[int, str]] = {
     ),
     "controllers": (4, ""),
     **dict.fromkeys(["false_colour", "film", "rerun_model", "rerun_recorder"], (5, "")),
-    **dict.fromkeys(["execution", "episode", "episode_result", "recording"], (5, "")),
+    **dict.fromkeys(["execution", "execution_config", "episode", "episode_result", "recording"], (5, "")),
     **dict.fromkeys(["scene_file", "env", "bench", "training"], (6, "")),
 }
 FORBIDDEN = {
@@ -124,6 +124,7 @@ def test_imports_are_absolute(path: Path) -> None:
         ("mpgrasp.controllers", ("torch", "mujoco", "rerun", "OpenGL")),
         ("mpgrasp.controllers.mppc", ("torch", "mujoco", "rerun", "OpenGL")),
         ("mpgrasp.bench", ("torch", "OpenGL")),
+        ("mpgrasp.env", ("torch", "rerun", "OpenGL")),
     ],
 )
 def test_importing_a_registry_loads_nothing_heavy(module: str, heavy: tuple[str, ...]) -> None:

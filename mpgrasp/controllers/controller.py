@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,6 +51,6 @@ class Controller(Protocol):
         """The grasp to execute, or None where no grasp was seen."""
         ...
 
-    def diagnostics(self) -> dict[str, FloatArray | float | bool]:
+    def diagnostics(self) -> Mapping[str, FloatArray | float | bool]:
         """What the controller looked at on the last tick, for recordings: grids (ny, nx) and scalars."""
         ...

@@ -1,0 +1,232 @@
+"""The gymnasium environment is the benchmark's own episode, stepped by someone else."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from mpgrasp.bench.suite import episode_seed, load_suite
+from mpgrasp.controllers import make_controller
+from mpgrasp.depth import DepthFrame, crop_resize, inpaint
+from mpgrasp.detectors import make_detector
+from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
+from mpgrasp.episode import EpisodeConfig, run_episode
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.grasp import GraspMap
+from mpgrasp.height_map import HeightMap
+
+STILL = np.zeros(4)
+DOWN = np.array([0.0, 0.0, -1.0, 0.0])
+
+Make = Callable[..., GraspEnv]
+
+
+class Painter:
+    """Paints a spot of quality that stands still in the camera, on an image of any crop and size."""
+
+    name = "painter"
+
+    def __init__(self, crop: int = 350, size: int = 224, height: float = 1.0) -> None:
+        self.crop, self.size, self.height = crop, size, height
+
+    def reset(self, truth: HeightMap) -> None: ...
+
+    def predict(self, frame: DepthFrame) -> GraspMap:
+        image = crop_resize(frame, self.crop, self.size)
+        k = image.intrinsics
+        x, y = (np.arange(k.width) - k.cx) / k.fx, (np.arange(k.height) - k.cy)[:, None] / k.fy
+        quality = self.height * np.exp(-((x - 0.1) ** 2 + (y + 0.05) ** 2) / 0.05).astype(np.float32)
+        flat = np.zeros_like(quality)
+        return GraspMap(
+            quality=quality, angle=flat, width=flat + 20, depth=inpaint(image.depth), intrinsics=k,
+            T_world_camera=image.T_world_camera, time=image.time,
+        )  # fmt: skip
+
+
+@pytest.fixture
+def make() -> Iterator[Make]:
+    made: list[GraspEnv] = []
+
+    def make_env(detector: Any = "oracle", **settings: Any) -> GraspEnv:
+        made.append(GraspEnv("thin", detector, EpisodeConfig(**settings)))
+        return made[-1]
+
+    yield make_env
+    for env in made:
+        env.close()
+
+
+def play(env: GraspEnv, action: np.ndarray | None = None, most: int = 300) -> tuple[Any, ...]:
+    """Step with one action, or with MP-PC's, from seed 0 to the end; number of steps, then the last step."""
+    _, info = env.reset(seed=0)
+    for k in range(1, most + 1):
+        step = env.step(info["mppc_action"] if action is None else action)
+        assert step[0] in env.observation_space
+        info = step[-1]
+        if step[2]:
+            return k, *step
+    raise AssertionError(f"no end in {most} steps")
+
+
+def test_gymnasium_has_nothing_to_complain_about() -> None:
+    env = gymnasium.make("mpgrasp.env:mpgrasp/Grasp-v0", render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+
+
+def test_with_the_actions_of_mppc_an_episode_ends_as_in_the_benchmark(make: Make) -> None:
+    env = make(start_height=0.3)
+    _, observed, reward, terminated, truncated, info = play(env)
+    suite = load_suite("thin")
+    expected = run_episode(
+        suite.scene_config(0), episode_seed("thin", 0, 0), detector=make_detector("oracle"),
+        controller=make_controller("mppc"), config=env.config,
+    )  # fmt: skip
+    result = info["result"]
+    assert (terminated, truncated) == (True, False)
+    assert (result.outcome, result.object, result.ticks) == (
+        expected.outcome,
+        expected.object,
+        expected.ticks,
+    )
+    assert reward == float(expected.success) == float(info["is_success"])
+    assert info["outcome"] == str(expected.outcome)
+    # actions are single precision, so the ways differ by less than a micrometre
+    assert result.path_length_m == pytest.approx(expected.path_length_m, abs=1e-6)
+    assert expected.grasp is not None
+    np.testing.assert_allclose(result.grasp.position, expected.grasp.position, atol=1e-5)
+    assert observed["tcp"][2] <= env.mppc.config.z_min
+
+
+def test_the_world_is_a_function_of_the_seed_and_not_of_what_was_done(make: Make) -> None:
+    env, other = make("oracle"), make(Painter())
+    first, info = env.reset(seed=3)
+    assert info["scene_seed"] == episode_seed("thin", 0, 3)
+    for _ in range(3):
+        env.step(np.array([1.0, -1.0, -1.0, 1.0]))
+    env.reset()
+    again, _ = env.reset(seed=3)
+    elsewhere, _ = other.reset(seed=3)
+    for name in ("depth", "tcp", "yaw", "time"):
+        np.testing.assert_array_equal(first[name], again[name])
+        np.testing.assert_array_equal(first[name], elsewhere[name])
+    assert not np.array_equal(first["depth"], env.reset(seed=4)[0]["depth"])
+
+
+def test_resets_without_a_seed_follow_np_random_and_stay_clear_of_the_benchmark(make: Make) -> None:
+    seeds = []
+    for env in (make(Painter()), make(Painter())):
+        env.reset(seed=7)
+        seeds.append([env.reset()[1]["scene_seed"] for _ in range(3)])
+    drawn = np.random.default_rng(7).integers(FIRST_TRAINING_EPISODE, 2**31, 3)
+    assert seeds[0] == seeds[1] == [episode_seed("thin", 0, int(number)) for number in drawn]
+    assert drawn.min() >= FIRST_TRAINING_EPISODE
+
+
+def test_an_action_is_a_velocity_in_units_of_the_documented_scale(make: Make) -> None:
+    env = make(Painter(), noise=False)
+    action = np.array([0.8, -1.0, 0.5, 1.0])
+    env.reset(seed=0)
+    for _ in range(4):  # the ramp
+        before = env.step(action)[0]
+    for _ in range(3):
+        after = env.step(action)[0]
+    seconds = float(after["time"][0] - before["time"][0])
+    assert seconds == pytest.approx(0.3)
+    moved = np.append(after["tcp"] - before["tcp"], after["yaw"] - before["yaw"]) / seconds
+    np.testing.assert_allclose(moved, action * ACTION_SCALE, atol=2e-3)
+
+
+def test_actions_are_cut_at_the_box_and_refused_where_they_mean_nothing(make: Make) -> None:
+    env = make(Painter())
+    env.reset(seed=0)
+    at_the_bound = env.step(DOWN)[0]
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.step(7 * DOWN)[0]["tcp"], at_the_bound["tcp"])
+    for action in (np.full(4, np.nan), np.zeros(3)):
+        with pytest.raises(ConfigError, match="4 finite numbers"):
+            env.step(action)
+
+
+def test_depth_is_that_of_the_table_and_zero_where_nothing_returned(make: Make) -> None:
+    observed, _ = make(Painter(), start_height=0.45).reset(seed=0)
+    depth = observed["depth"]
+    assert (depth == 0).any()
+    # the optical centre lies 63 mm above the tcp; cloth and stick are a few millimetres high
+    assert float(np.median(depth[depth > 0])) == pytest.approx(float(observed["tcp"][2]) + 0.0634, abs=0.01)
+
+
+def test_quality_lies_on_the_pixels_of_depth_whatever_the_detector_sees(make: Make) -> None:
+    whole = make(Painter()).reset(seed=0)[0]["quality"]
+    part = make(Painter(crop=200, size=300)).reset(seed=0)[0]["quality"]
+    seen = np.abs(np.arange(224) - 111.5) < 200 / 350 * 112 - 1
+    np.testing.assert_allclose(part[np.ix_(seen, seen)], whole[np.ix_(seen, seen)], atol=2e-3)
+    beyond = np.abs(np.arange(224) - 111.5) > 200 / 350 * 112 + 1
+    assert whole[beyond].max() > 0.1
+    assert not part[beyond].any()
+    assert not part[:, beyond].any()
+
+
+def test_a_stretched_arm_ends_the_episode_with_a_reflex_that_has_a_name(make: Make) -> None:
+    _, _, reward, terminated, truncated, info = play(make(Painter()), np.array([1.0, 0.0, 0.0, 0.0]))
+    assert (reward, terminated, truncated) == (0.0, True, False)
+    assert info["outcome"] == "reflex"
+    assert info["reflex"].startswith(f"{info['result'].reflex.limit}: ")
+    assert info["result"].grasp is None
+
+
+def test_time_runs_out(make: Make) -> None:
+    steps, observed, reward, terminated, truncated, info = play(make(Painter(), max_reach_time=0.3), STILL)
+    assert (steps, reward, terminated, truncated) == (3, 0.0, True, False)
+    assert observed["time"] == pytest.approx(0.3)
+    assert (info["outcome"], info["reflex"], info["result"].ticks) == ("timeout", "", 3)
+
+
+def test_who_sees_nothing_grasps_nothing(make: Make) -> None:
+    _, _, reward, *_, info = play(make(Painter(height=0.0), start_height=0.2), DOWN)
+    assert (reward, info["outcome"], info["is_success"]) == (0.0, "no_grasp", False)
+
+
+def test_stepping_needs_an_episode_that_runs(make: Make) -> None:
+    env = make(Painter(), max_reach_time=0.1)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(STILL)
+    play(env, STILL)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(STILL)
+    env.close()
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(STILL)
+
+
+def test_unusable_settings_are_refused_by_name() -> None:
+    with pytest.raises(ConfigError, match=r"above 0\.175"):
+        GraspEnv(config=EpisodeConfig(start_height=0.15))
+    with pytest.raises(ConfigError, match="rgb_array"):
+        GraspEnv(render_mode="human")
+    with pytest.raises(ConfigError, match="unknown suite"):
+        GraspEnv("nonsense")
+
+
+def test_several_run_side_by_side_and_none_resets_itself() -> None:
+    # the first is all but down when it starts
+    envs = [
+        GraspEnv(detector=Painter(height=0.0), config=EpisodeConfig(start_height=z)) for z in (0.176, 0.5)
+    ]
+    vector = SyncVectorEnv([lambda env=env: env for env in envs])  # type: ignore[misc]
+    vector.reset(seed=5)
+    *_, terminated, _, info = vector.step(np.tile(DOWN, (2, 1)))
+    assert terminated.tolist() == [True, False]
+    assert info["outcome"].tolist() == ["no_grasp", None]
+    assert info["mppc_action"].shape == (2, 4)
+    assert GraspEnv.metadata["autoreset_mode"] is AutoresetMode.DISABLED
+    vector.close()
