@@ -35,7 +35,6 @@ it descends at half of the vertical one."""
 FIRST_TRAINING_EPISODE = 2**20
 """A reset without a seed plays an episode of this number or above, which no benchmark reaches."""
 
-_REACH = 2.0  # [m], farther than the tool gets from the base
 _STEERED = [0, 1, 2, 5]  # components of a twist that an action sets
 
 Info = dict[str, Any]
@@ -99,7 +98,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         self.observation_space = spaces.Dict(  # type: ignore[assignment]
             depth=spaces.Box(0.0, FAR, image, np.float32),
             quality=spaces.Box(0.0, 1.0, image, np.float32),
-            tcp=spaces.Box(-_REACH, _REACH, (3,), np.float32),
+            tcp=spaces.Box(-2.0, 2.0, (3,), np.float32),  # farther than the arm reaches
             yaw=spaces.Box(-np.float32(np.pi), np.float32(np.pi), (1,), np.float32),
             time=spaces.Box(0.0, latest, (1,), np.float32),
         )

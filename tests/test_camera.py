@@ -9,6 +9,7 @@ import pytest
 from mpgrasp import camera as camera_module
 from mpgrasp import rasteriser
 from mpgrasp.camera import D435_INTRINSICS, WristCamera
+from mpgrasp.convex_rays import solids
 from mpgrasp.depth import CameraIntrinsics, crop_resize
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import look_at, looking_down, transform, transform_points
@@ -334,14 +335,14 @@ def test_all_at_once_rays_meet_what_single_rays_of_mujoco_meet(world, pose, grou
 @pytest.mark.parametrize("euler", ["0 0 0", "20 -10 30", "-70 0 15"])
 def test_a_height_field_of_any_pose_and_steepness_is_met_where_single_rays_meet_it(height, euler) -> None:
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><asset><hfield name="h" nrow="31" ncol="45" size=".2 .15 {height or 1} .01"/></asset>'
+        f'<mujoco><asset><hfield name="h" nrow="31" ncol="45" size=".2 .15 {height or 0.004} .01"/></asset>'
         f'<worldbody><geom type="hfield" hfield="h" pos=".03 -.02 .01" euler="{euler}"/></worldbody></mujoco>'
     )
     bumps = cv2.GaussianBlur(np.random.default_rng(1).random((31, 45)), (0, 0), 2)
     model.hfield_data[:] = ((bumps - bumps.min()) / np.ptp(bumps)).ravel() * (height > 0)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    for pose in (*POSES, GRAZING, UNDER):
+    for pose in (POSES[0], GRAZING, UNDER):
         quick, single = ray_cast(model, data, SMALL, pose), cast_rays(model, data, SMALL, pose).depth
         wrong = ~np.isclose(quick, single, atol=2e-6, equal_nan=True)
         assert wrong.mean() < 2e-4, (pose, wrong.sum())
@@ -363,6 +364,7 @@ def test_dents_holes_and_clear_materials_are_seen_as_mujoco_sees_them() -> None:
     )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
+    assert [len(solids(model, geom)) for geom in range(model.ngeom)] == [0, 1, 1, 0, 1]
     for pose in (*POSES, UNDER, ASIDE):
         quick, single = ray_cast(model, data, SMALL, pose), cast_rays(model, data, SMALL, pose).depth
         wrong = ~np.isclose(quick, single, atol=2e-6, equal_nan=True)

@@ -34,7 +34,7 @@ def provenance() -> dict[str, Any]:
         "mpgrasp": mpgrasp.__version__,
         "git": git_state(),
         "python": platform.python_version(),
-        "platform": platform.platform(),
+        "platform": platform.system(),
         "machine": platform.machine(),
         "packages": {name: version for name in PACKAGES if (version := _version(name))},
     }

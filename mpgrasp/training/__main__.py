@@ -15,8 +15,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = argparse.ArgumentParser(prog="python -m mpgrasp.training", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="generate|train")
-    for name, module in (("generate", generate), ("train", train)):
-        command = commands.add_parser(name, description=module.__doc__, help=module.main.__doc__)
+    helps = (("generate", generate, "make a data set"), ("train", train, "train a network on one"))
+    for name, module, text in helps:
+        command = commands.add_parser(name, description=module.__doc__, help=text)
         module.add_arguments(command)
         command.set_defaults(run=module.main)
     args = parser.parse_args(argv)
