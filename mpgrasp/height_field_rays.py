@@ -122,5 +122,5 @@ def height_field_depth(
         a, b = start + enter * step, start + leave * step
         passes |= (np.maximum(a, b) < 0) | (np.minimum(a, b) > last)
     t[out] = np.inf
-    pass
+    unknown[out[~passes]] = True
     return t.reshape(shape), unknown.reshape(shape)

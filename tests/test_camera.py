@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpgrasp import camera as camera_module
-from mpgrasp import rasteriser
+from mpgrasp import height_field_rays, rasteriser
 from mpgrasp.camera import D435_INTRINSICS, WristCamera
 from mpgrasp.convex_rays import solids
 from mpgrasp.depth import CameraIntrinsics, crop_resize
@@ -346,6 +346,14 @@ def test_a_height_field_of_any_pose_and_steepness_is_met_where_single_rays_meet_
         quick, single = ray_cast(model, data, SMALL, pose), cast_rays(model, data, SMALL, pose).depth
         wrong = ~np.isclose(quick, single, atol=2e-6, equal_nan=True)
         assert wrong.mean() < 2e-4, (pose, wrong.sum())
+
+
+def test_rays_that_do_not_settle_on_a_triangle_in_time_are_cast_by_mujoco(world, monkeypatch) -> None:
+    model, data = world
+    single = cast_rays(model, data, SMALL, POSES[2]).depth
+    monkeypatch.setattr(height_field_rays, "_ROUNDS", 1)
+    quick = ray_cast(model, data, SMALL, POSES[2])
+    assert np.mean(~np.isclose(quick, single, atol=2e-6, equal_nan=True)) < 2e-4
 
 
 def test_dents_holes_and_clear_materials_are_seen_as_mujoco_sees_them() -> None:
