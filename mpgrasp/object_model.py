@@ -59,6 +59,9 @@ class Part:
     def __post_init__(self) -> None:
         if self.shape not in _GEOM_TYPES:
             raise AssetError("unknown shape of a part", got=self.shape, allowed=_GEOM_TYPES)
+        for what, numbers, n in (("position", self.position, 3), ("quaternion", self.quaternion, 4)):
+            if np.shape(numbers) != (n,) or not np.isfinite(numbers).all():
+                raise AssetError(f"unusable {what} of a {self.shape}", got=numbers, allowed=f"{n} numbers")
         size = tuple(float(s) for s in self.size)
         if len(size) != _SIZES[self.shape] or not all(0 < s < np.inf for s in size):
             raise AssetError(
@@ -159,6 +162,10 @@ class ObjectModel:
             raise AssetError(f"unusable mass of object {self.name} [kg]", got=self.mass, allowed="above 0")
         if not 0 < self.friction < np.inf:
             raise AssetError(f"unusable friction of object {self.name}", got=self.friction, allowed="above 0")
+        if np.shape(self.rgba) != (4,):
+            raise AssetError(
+                f"unusable rgba of object {self.name}", got=self.rgba, allowed="4 numbers, 0 to 1"
+            )
         if max(self.size) > MAX_SIZE:
             raise AssetError(
                 f"object {self.name} is too large [m]",

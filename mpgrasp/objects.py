@@ -79,6 +79,8 @@ def load_object(name: str) -> ObjectModel:
         )
     except KeyError as error:
         raise AssetError(f"declaration of object {name} lacks a field", got=error.args[0]) from None
+    except (TypeError, ValueError) as error:  # text where a number belongs, and the like
+        raise AssetError(f"unusable declaration of object {name}", got=str(error)) from None
 
 
 def object_from_mesh(
@@ -152,7 +154,7 @@ def read_pieces(path: Path) -> list[FloatArray]:
     """Vertices (n, 3) [m] of each `o` group of an OBJ file, in the file's order.
 
     Raises:
-        AssetError: unreadable or empty file.
+        AssetError: unreadable or empty file, or a vertex that is not three numbers.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -164,7 +166,13 @@ def read_pieces(path: Path) -> list[FloatArray]:
         if words[:1] == ["o"] or (words[:1] == ["v"] and not pieces):
             pieces.append([])
         if words[:1] == ["v"]:
-            pieces[-1].append([float(x) for x in words[1:4]])
+            try:
+                x, y, z = map(float, words[1:4])
+            except ValueError:
+                raise AssetError(
+                    f"mesh file {path} has a broken vertex", got=line[:60], allowed="v x y z"
+                ) from None
+            pieces[-1].append([x, y, z])
     arrays = [np.array(piece) for piece in pieces if piece]
     if not arrays:
         raise AssetError("mesh is empty", got=str(path), allowed="an OBJ file with vertices")

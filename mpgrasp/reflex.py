@@ -77,7 +77,7 @@ class ReflexConfig:
     """(7,) [rad/s]"""
     ddq_max: FloatArray = field(default_factory=lambda: _fer("DDQ_MAX"))
     """(7,) of the commanded velocity [rad/s2]"""
-    cartesian_velocity: float = 1.7
+    cartesian_velocity: float = panda.CARTESIAN_SPEED_MAX
     """Of the tool point [m/s]."""
     cartesian_rotation: float = 2.5
     """Of the tool [rad/s]."""

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import fakes
 import pytest
 
+from mpgrasp import objects
 from mpgrasp.bench.__main__ import main, parse_weights
 from mpgrasp.exceptions import ConfigError
 
@@ -102,6 +104,53 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert printed.err.count("\n") == 1
     assert message in printed.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def catalogue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An object catalogue of one's own, to be written into."""
+
+    def forget() -> None:
+        objects._declarations.cache_clear()
+        objects.load_object.cache_clear()
+
+    monkeypatch.setattr(objects, "OBJECT_ASSETS", tmp_path)
+    forget()
+    yield tmp_path
+    forget()
+
+
+TRIANGLES = "o a\nv 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 0 0 {0}\n"
+
+
+@pytest.mark.parametrize(
+    ("mesh", "mass", "message"),
+    [
+        ("", "0.1", "mesh is empty"),
+        (TRIANGLES.format(40), "0.1", "too large [m]; got 40.0; allowed: edges up to 0.3 m"),
+        ("v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\n", "0.1", "mesh is flat"),
+        (TRIANGLES.format("wide"), "0.1", "broken vertex; got 'v wide 0 0'"),
+        ("v 0 0\n", "0.1", "broken vertex"),
+        (TRIANGLES.format(0.04), '"heavy"', "unusable declaration of object thing"),
+        (TRIANGLES.format(0.04), "-1", "unusable mass"),
+    ],
+)
+def test_an_object_that_cannot_be_used_is_one_line_and_exit_code_2(
+    catalogue: Path, capsys: pytest.CaptureFixture[str], mesh: str, mass: str, message: str
+) -> None:
+    (catalogue / "thing.obj").write_text(mesh)
+    (catalogue / "objects.toml").write_text(
+        f'[thing]\nmesh = "thing.obj"\nmass = {mass}\nfriction = 0.5\nrgba = [1, 1, 1, 1]\nprovenance = ""\n'
+    )
+    (catalogue / "mine.toml").write_text('title = "Mine"\n[scene]\nobjects = ["thing"]\n')
+    out = catalogue / "out"
+    assert main([str(catalogue / "mine.toml"), "--detector", "oracle", "--out", str(out)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("mpgrasp: error: ")
+    assert printed.err.count("\n") == 1
+    assert message in printed.err
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("detector", ["dhrnet", "ggcnn"])

@@ -186,7 +186,9 @@ def test_folding_batch_norms_leaves_the_function_alone(files: dict[str, Path | N
     assert np.allclose(folded._heads(image), plain, atol=1e-4 * np.abs(plain).max())
 
 
-def test_unknown_names_and_settings_are_one_clear_error(files: dict[str, Path | None], tmp_path: Path) -> None:
+def test_unknown_names_and_settings_are_one_clear_error(
+    files: dict[str, Path | None], tmp_path: Path
+) -> None:
     with pytest.raises(ConfigError, match=r"unknown detector.*dhrnet, ggcnn, oracle"):
         make_detector("yolo")
     with pytest.raises(ConfigError, match="no weights"):

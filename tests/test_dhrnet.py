@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import torch
 from torch import nn
@@ -9,7 +11,7 @@ from torch import nn
 from mpgrasp.detectors.dhrnet import AUTHORS, DHRNet, DHRNetConfig
 from mpgrasp.exceptions import ConfigError
 
-SMALL = {"width": 4, "stem_width": 4, "head_width": 4, "blocks": 1}
+SMALL: dict[str, Any] = {"width": 4, "stem_width": 4, "head_width": 4, "blocks": 1}
 
 
 def count(network: nn.Module) -> int:
@@ -28,7 +30,7 @@ def test_every_head_has_a_value_for_every_pixel(channels: int, fine_head: bool) 
 
 def test_the_authors_settings_have_the_authors_size() -> None:
     with torch.device("meta"):
-        network = DHRNet(DHRNetConfig(**AUTHORS))  # type: ignore[arg-type]
+        network = DHRNet(DHRNetConfig(**AUTHORS))
     assert 65.5e6 < count(network) < 66.3e6
 
 

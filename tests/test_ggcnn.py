@@ -41,7 +41,7 @@ PUBLISHED = {
 @pytest.mark.parametrize("variant", [1, 2])
 def test_state_dict_has_exactly_the_published_entries(variant: int) -> None:
     state = make_ggcnn(GGCNNConfig(variant=variant)).state_dict()
-    expected = {}
+    expected: dict[str, tuple[int, ...]] = {}
     for layer, shape in PUBLISHED[variant].items():
         # transposed convolutions keep (in, out): their bias has the second size
         expected[f"{layer}.weight"] = shape

@@ -17,7 +17,7 @@ PACKAGE = Path(mpgrasp.__file__).parent
 PERCEPTION, WORLD = "perception", "world"
 ROWS: dict[str, tuple[int, str]] = {
     **dict.fromkeys(["exceptions", "paths", "geometry"], (1, "")),
-    **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp"], (2, "")),
+    **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp", "false_colour"], (2, "")),
     **dict.fromkeys(["detectors", "grid_map", "entropy"], (3, PERCEPTION)),
     **dict.fromkeys(["object_model", "objects", "terrain", "settling", "scene"], (3, WORLD)),
     **dict.fromkeys(
@@ -38,9 +38,9 @@ ROWS: dict[str, tuple[int, str]] = {
         (3, WORLD),
     ),
     "controllers": (4, ""),
-    **dict.fromkeys(["false_colour", "film", "rerun_model", "rerun_recorder"], (5, "")),
+    **dict.fromkeys(["film", "rerun_model", "rerun_recorder"], (5, "")),
     **dict.fromkeys(["execution", "execution_config", "episode", "episode_result", "recording"], (5, "")),
-    **dict.fromkeys(["scene_file", "env", "bench", "training"], (6, "")),
+    **dict.fromkeys(["scene_file", "env", "bench", "training", "show"], (6, "")),
 }
 FORBIDDEN = {
     PERCEPTION: {"mujoco", "mink"},

@@ -133,6 +133,14 @@ def test_unusable_part_is_refused(size: tuple[float, ...]) -> None:
         Part(shape="box", size=size)
 
 
+@pytest.mark.parametrize(
+    "pose", [{"position": (0.1,)}, {"quaternion": (1.0, 0.0, 0.0)}, {"position": (0, 0, np.nan)}]
+)
+def test_unusable_pose_of_a_part_is_refused(pose: dict[str, tuple[float, ...]]) -> None:
+    with pytest.raises(AssetError, match=r"position|quaternion"):
+        Part(shape="box", size=(0.01, 0.01, 0.01), **pose)  # type: ignore[arg-type]
+
+
 def _write_box(path: Path, edges: tuple[float, float, float]) -> Path:
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.box(edges).export(path)

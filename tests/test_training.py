@@ -27,7 +27,7 @@ from mpgrasp.training.progress import ProgressLog
 from mpgrasp.training.trainer import Trainer
 from mpgrasp.training.trainer_config import LossConfig, TrainConfig
 
-SMALL = {"width": 8, "stem_width": 8, "head_width": 8, "blocks": 1}
+SMALL = {"width": 8, "stem_width": 8, "head_width": 8, "blocks": 1, "fine_head": False}
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def toy_sample(seed: int = 0) -> Sample:
     toy = toy_image(np.random.default_rng(seed))
     return Sample(
         depth=np.nan_to_num(decode_depth(toy["depth"]), nan=0.4),
-        quality=toy["quality"] / np.float32(255),
+        quality=(toy["quality"] / 255).astype(np.float32),
         angle=decode_angle(toy["angle"]),
         width=toy["width"].astype(np.float32),
         valid=np.ones(toy["depth"].shape, bool),
@@ -106,8 +106,8 @@ def test_shards_are_read_with_holes_filled_and_scenes_kept_apart(shards: Path) -
     scenes = dataset.column("scene")
     assert scenes is not None
     assert not set(scenes[dataset.training]) & set(scenes[dataset.held])
-    batch = dataset.batch([0, 5], NetworkInput(size=96, scale=20.0, range_channel=True))
-    assert batch.image.shape == (2, 2, 96, 96)
+    batch = dataset.batch([0, 5], NetworkInput(size=64, scale=20.0, range_channel=True))
+    assert batch.image.shape == (2, 2, 64, 64)
     assert np.isfinite(batch.image).all()
     assert dataset.sample(0).depth.min() > 0.3
 
@@ -135,7 +135,7 @@ def test_perfect_heads_cost_nothing_and_invalid_pixels_never_count() -> None:
     )
     valid = torch.ones_like(quality, dtype=torch.bool)
     assert float(grasp_loss(heads, quality, angle, width, valid, LossConfig())["loss"]) < 1e-10
-    wrong = tuple(h + torch.where(torch.arange(96) < 10, 5.0, 0.0) for h in heads)
+    wrong = tuple(h + torch.where(torch.arange(64) < 10, 5.0, 0.0) for h in heads)
     valid[..., :10] = False
     assert float(grasp_loss(wrong, quality, angle, width, valid, LossConfig())["loss"]) < 1e-10  # type: ignore[arg-type]
     valid[:] = True
@@ -160,13 +160,15 @@ def test_a_grasp_beside_the_object_is_no_hit() -> None:
 
 
 def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path: Path) -> None:
-    run = trainer(shards, tmp_path / "w.safetensors", epochs=12.0, validate_every=0.5, average=0.95)
-    before = run.evaluate()["hit"]
+    run = trainer(
+        shards, tmp_path / "w.safetensors", epochs=12.0, validate_every=0.5, average=0.95, augmentation=None
+    )
+    before = run.evaluate()["rectangle"]
     first = run.train_step(run._draw(0))["loss"]
     best = run.run(ProgressLog(quiet=True))
     last = run.train_step(run._draw(0))["loss"]
     assert last < 0.4 * first
-    assert best["hit"] >= max(0.7, before)
+    assert best["rectangle"] > before + 0.3
     card = read_card(tmp_path / "w.safetensors")["card"]
     assert card["seed"] == 0
     assert card["validation"]["hit"] == pytest.approx(best["hit"], abs=1e-3)
@@ -176,7 +178,7 @@ def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path
     for i in run.dataset.held:
         truth = run.dataset.sample(int(i))
         hits.append(judge(*detector.grasp_arrays(truth.depth), truth).hit)
-    assert np.mean(hits) == pytest.approx(best["hit"], abs=0.15)  # float32 here, bfloat16 there
+    assert np.mean(hits) == pytest.approx(best["hit"], abs=0.2)  # float32 here, bfloat16 there
 
 
 def test_a_resumed_run_is_the_same_as_an_unbroken_one(shards: Path, tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_published_state_dicts_load_unchanged(variant: int, size: int, tmp_path:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(WeightsError, match="no such weights file.*gone"):
+    with pytest.raises(WeightsError, match=r"no such weights file.*gone"):
         load_weights("dhrnet", tmp_path / "gone.safetensors")
 
 
@@ -84,7 +84,7 @@ def test_a_truncated_file_is_a_weights_error(tmp_path: Path) -> None:
 
 def test_foreign_safetensors_are_refused(tmp_path: Path) -> None:
     save_file({"layer.weight": torch.zeros(3)}, tmp_path / "w.safetensors")
-    with pytest.raises(WeightsError, match="not a weights file of mpgrasp"):
+    with pytest.raises(WeightsError, match="not a weights file"):
         load_weights("dhrnet", tmp_path / "w.safetensors")
 
 
@@ -98,7 +98,7 @@ def test_a_state_dict_of_another_shape_names_the_first_entry_that_differs(tmp_pa
     state = build_network("ggcnn", {}).state_dict()
     state["pos_output.bias"] = torch.zeros(7)
     torch.save(state, tmp_path / "w.pt")
-    with pytest.raises(WeightsError, match="pos_output.bias"):
+    with pytest.raises(WeightsError, match=r"pos_output\.bias"):
         load_weights("ggcnn", tmp_path / "w.pt")
 
 

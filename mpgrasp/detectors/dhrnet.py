@@ -10,6 +10,7 @@ parameters.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -23,7 +24,7 @@ BN_MOMENTUM = 0.1
 """The paper's Section IV-A."""
 EXPANSION = 4
 """Output channels of a bottleneck block, in units of its width."""
-AUTHORS = {
+AUTHORS: dict[str, Any] = {
     "width": 48,
     "modules": (1, 4, 3),
     "blocks": 4,

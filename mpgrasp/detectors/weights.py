@@ -81,6 +81,7 @@ def save_weights(
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         save_file(tensors, temporary, metadata=metadata)
+        temporary.chmod(0o644)  # safetensors makes files that only their owner can read
         temporary.replace(path)
     except (OSError, SafetensorError) as error:
         raise OutputError(f"weights cannot be written: {error}", got=str(path)) from error
@@ -140,7 +141,9 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
         raise WeightsError(f"weights cannot be used: {error}", got=str(path)) from error
     channels = about["settings"].get("channels", 1)
     if channels != image.channels:
-        raise WeightsError("weights with a wrong number of channels", got=channels, allowed=str(image.channels))
+        raise WeightsError(
+            "weights with a wrong number of channels", got=channels, allowed=str(image.channels)
+        )
     _load_state(network, state, path)
     return NetworkWeights(
         name=name,

@@ -123,7 +123,9 @@ class GraspDataset:
         about: list[dict[str, object]] = []
         for directory, meta in self._told.items():
             shards = sum(path.parent == directory for path in self._seen)
-            making: dict[str, object] = {k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta}
+            making: dict[str, object] = {
+                k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta
+            }
             about.append({"name": directory.name, "shards": shards, **making})
         return about
 

@@ -40,7 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--beta", type=float, default=loss.beta, help="bend of smooth-L1 (default: %(default)s)")
     add("--centre", default=image.centre, help="of the input's depth: mean or median (default: %(default)s)")
     add("--scale", type=float, default=image.scale, help="input units a metre (default: %(default)s)")
-    add("--no-range", action="store_true", help="no second channel with the distance")
+    add(
+        "--range",
+        action=argparse.BooleanOptionalAction,
+        default=image.range_channel,
+        help="a second channel with the scene's distance (default: %(default)s)",
+    )
     add("--no-augmentation", action="store_true", help="images as they are")
     add(
         "--thin-weight",
@@ -111,7 +116,7 @@ def config_from(args: argparse.Namespace) -> TrainConfig:
     return TrainConfig(
         name=args.name,
         settings=settings,
-        input=NetworkInput(centre=args.centre, scale=args.scale, range_channel=not args.no_range),
+        input=NetworkInput(centre=args.centre, scale=args.scale, range_channel=args.range),
         loss=LossConfig(positive=args.positive, background=args.background, beta=args.beta),
         augmentation=None if args.no_augmentation else Augmentation(),
         epochs=args.epochs,

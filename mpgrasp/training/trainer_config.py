@@ -43,9 +43,7 @@ class TrainConfig:
     """Network, a key of `TRAINABLE`."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Of the network's config, beside its channels."""
-    input: NetworkInput = field(
-        default_factory=lambda: NetworkInput(centre="median", scale=20.0, range_channel=True)
-    )
+    input: NetworkInput = field(default_factory=lambda: NetworkInput(centre="median", scale=20.0))
     """What the network sees."""
     loss: LossConfig = field(default_factory=LossConfig)
     augmentation: Augmentation | None = field(default_factory=Augmentation)

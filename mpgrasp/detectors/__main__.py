@@ -1,0 +1,71 @@
+"""`python -m mpgrasp.detectors show|card`: what detectors see, and what is known about their weights.
+
+What is done with the options is in `mpgrasp.show`: this package knows nothing of the world.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+from mpgrasp.exceptions import ConfigError
+
+_EPILOG = """\
+examples:
+  python -m mpgrasp.detectors show dhrnet --suite thin --seed 3 --height 0.5 --out thin.png
+  python -m mpgrasp.detectors show ggcnn,dhrnet,oracle --suite unseen --above-object --height 0.2
+  python -m mpgrasp.detectors show my_net:MyDetector --weights my_net.pt
+  python -m mpgrasp.detectors card dhrnet --weights out/dhrnet.safetensors
+
+exit code: 0 done, 2 unusable input, 130 interrupted (Ctrl-C).
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
+    parser = _Parser(
+        prog="python -m mpgrasp.detectors",
+        description="See what grasp detectors see, and what is known about their weights.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="show|card")
+    show = commands.add_parser(
+        "show", help="draw their maps and best grasps side by side", allow_abbrev=False
+    )
+    add = show.add_argument
+    add("detector", metavar="D[,D]", help="names, or your own as module:Class")
+    add("--suite", default="thin", help="suite, or a path to a declaration.toml (default: thin)")
+    add("--seed", metavar="S", type=int, default=0, help="of the benchmark run (default: 0)")
+    add("--episode", metavar="K", type=int, default=0, help="of that run, from 0 (default: 0)")
+    add("--height", metavar="Z", type=float, default=0.5, help="of the tool [m] (default: 0.5)")
+    add(
+        "--above-object",
+        metavar="OBJECT",
+        nargs="?",
+        const="",
+        help="camera over an object, the scene's first if not said, in place of the episode's start",
+    )
+    add("--out", metavar="FILE.png", type=Path, default=Path("show.png"), help="(default: show.png)")
+    add("--weights", metavar="[D=]FILE", action="append", default=[], help="in place of the shipped ones")
+    add("--camera", metavar="auto|gl|ray", default="auto", help="depth camera's backend (default: auto)")
+    add("--no-noise", action="store_true", help="a perfect depth camera")
+    about = commands.add_parser("card", help="print the training card of weights", allow_abbrev=False)
+    about.add_argument("detector", metavar="NAME", help="whose weights they are")
+    about.add_argument("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")
+    return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise ConfigError(message, allowed=f"see {self.prog} --help")
+
+
+if __name__ == "__main__":
+    import sys
+
+    from mpgrasp.show import main
+
+    sys.exit(main(make_parser()))
