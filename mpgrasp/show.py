@@ -161,8 +161,7 @@ def card(name: str, weights: Path | None) -> dict[str, Any]:
 def _run_show(options: argparse.Namespace) -> None:
     from PIL import Image
 
-    from mpgrasp.bench.__main__ import parse_weights
-    from mpgrasp.bench.plugins import load_detector
+    from mpgrasp.bench.plugins import load_detector, parse_weights
     from mpgrasp.detectors.pictures import side_by_side
     from mpgrasp.recording import claim_file
 

@@ -18,7 +18,8 @@ def best(grasps: WorldGrasps) -> tuple[float, float, float, float, float]:
     m = grasps.height_map
     row, col = np.unravel_index(np.argmax(grasps.quality), grasps.quality.shape)
     x, y = m.x0 + col * m.cell, m.y0 + row * m.cell
-    return float(x), float(y), *(float(a[row, col]) for a in (grasps.angle, grasps.width, grasps.quality))
+    angle, width, quality = (float(a[row, col]) for a in (grasps.angle, grasps.width, grasps.quality))
+    return float(x), float(y), angle, width, quality
 
 
 @pytest.mark.parametrize("yaw", np.linspace(-1.5, 1.5, 7))

@@ -15,7 +15,8 @@ import fakes
 import pytest
 
 from mpgrasp import objects
-from mpgrasp.bench.__main__ import main, parse_weights
+from mpgrasp.bench.__main__ import main
+from mpgrasp.bench.plugins import parse_weights
 from mpgrasp.exceptions import ConfigError
 
 REPOSITORY = Path(__file__).parent.parent

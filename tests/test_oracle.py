@@ -19,7 +19,7 @@ STICK = Solid(x=0.52, y=-0.03, yaw=0.3, length=0.08, breadth=0.02, height=0.008)
 
 def frame_of(truth: HeightMap, T: FloatArray) -> DepthFrame:
     """Depth of a camera that looks straight down, by fixed-point search along each ray."""
-    v, u = np.indices((480, 640))
+    v, u = np.indices((480, 640)).astype(float)
     z = np.full(u.shape, T[2, 3])
     for _ in range(4):
         camera = INTRINSICS.deproject(u, v, z)

@@ -93,29 +93,6 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def parse_weights(given: Sequence[str], detectors: Sequence[str]) -> dict[str, Path]:
-    """Weights files by detector from `FILE` or `DETECTOR=FILE`.
-
-    Raises:
-        ConfigError: it is unclear or impossible whose weights they are.
-    """
-    weights: dict[str, Path] = {}
-    for text in given:
-        name, separator, file = text.partition("=")
-        if not (separator and name in detectors):
-            if len(detectors) > 1:
-                raise ConfigError(
-                    "--weights does not say whose they are",
-                    got=text,
-                    allowed=[f"{d}=FILE" for d in detectors],
-                )
-            name, file = detectors[0], text
-        if name in weights:
-            raise ConfigError("--weights given twice for one detector", got=name, allowed="one file each")
-        weights[name] = Path(file)
-    return weights
-
-
 def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
     """Play what the command line asks for.
 
@@ -125,7 +102,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
     Raises:
         MpgraspError: input that cannot be used.
     """
-    from mpgrasp.bench.plugins import check_name, controller_names, detector_names
+    from mpgrasp.bench.plugins import check_name, controller_names, detector_names, parse_weights
     from mpgrasp.bench.report import ProgressReport, print_table
     from mpgrasp.bench.run_directory import RunDirectory
     from mpgrasp.bench.runner import EpisodeError, Plan, Player, play_all

@@ -7,7 +7,7 @@ A class given by import path is called with no arguments, or, where weights are 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -126,3 +126,26 @@ def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str
             f"{kind} plug-in lacks {', '.join(missing)}", got=path, allowed=f"methods {', '.join(methods)}"
         )
     return made
+
+
+def parse_weights(given: Sequence[str], detectors: Sequence[str]) -> dict[str, Path]:
+    """Weights files by detector from `FILE` or `DETECTOR=FILE`.
+
+    Raises:
+        ConfigError: it is unclear or impossible whose weights they are.
+    """
+    weights: dict[str, Path] = {}
+    for text in given:
+        name, separator, file = text.partition("=")
+        if not (separator and name in detectors):
+            if len(detectors) > 1:
+                raise ConfigError(
+                    "--weights does not say whose they are",
+                    got=text,
+                    allowed=[f"{d}=FILE" for d in detectors],
+                )
+            name, file = detectors[0], text
+        if name in weights:
+            raise ConfigError("--weights given twice for one detector", got=name, allowed="one file each")
+        weights[name] = Path(file)
+    return weights
