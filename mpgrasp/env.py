@@ -23,7 +23,7 @@ from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.episode import Episode, EpisodeConfig
+from mpgrasp.episode import Episode, EpisodeConfig, controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.film import Watcher
 from mpgrasp.grasp import GraspMap
@@ -113,7 +113,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         scene, scene_seed = self.suite.scene_config(number), episode_seed(self.suite.name, 0, number)
         self._episode = Episode(scene, scene_seed, detector=self.detector, config=self.config)
         self._over = False
-        self.mppc.reset(scene_seed)
+        self.mppc.reset(controller_seed(scene_seed))
         return self._look(self._episode)
 
     def step(self, action: ArrayLike) -> tuple[Observed, float, bool, bool, Info]:

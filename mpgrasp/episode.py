@@ -17,7 +17,7 @@ import numpy as np
 from mpgrasp.camera import BACKENDS, WristCamera
 from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.episode_result import EpisodeResult, Outcome
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.execution import execute_grasp
@@ -37,6 +37,7 @@ STAGES = ("render", "detect", "control", "ik", "physics")
 # streams of an episode's seed beside those of the scene
 _NOISE_STREAM = 11
 _START_STREAM = 12
+_CONTROLLER_STREAM = 13
 _TICK_PERIOD = 0.1  # [s], between two records of a recording once the reach is over
 
 
@@ -97,7 +98,7 @@ def run_episode(
     """
     episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
     try:
-        controller.reset(seed)
+        controller.reset(controller_seed(seed))
         while episode.interruption() is None:
             observation = episode.look()
             with episode.timed("control"):
@@ -108,6 +109,11 @@ def run_episode(
         return episode.conclude(controller.final_grasp() if episode.interruption() is None else None)
     finally:
         episode.close()
+
+
+def controller_seed(seed: int) -> int:
+    """Seed that the controller of an episode is told; the scene cannot be built from it."""
+    return int(np.random.default_rng([seed, _CONTROLLER_STREAM]).integers(2**32))
 
 
 class Episode:
@@ -153,7 +159,7 @@ class Episode:
         self._last_record = -np.inf
         self._grasp: Grasp | None = None
         self.recorder.start(self.simulation)
-        detector.reset(self.scene.height_map())
+        detector.reset(self.scene.height_map() if reads_truth(detector) else None)
 
     def look(self) -> Observation:
         """The view of this tick. Its noise depends on seed and tick alone: looking twice shows the same."""

@@ -102,7 +102,7 @@ class ArmDriver:
         self._jerk_count = 0
         self._max_acceleration = self._max_tracking = 0.0
         self._max_ddq, self._max_dq = np.zeros(7), np.zeros(7)
-        self._min_singular_value = np.inf
+        self._min_singular_value = float(np.linalg.svd(self.ik.jacobian(self.q), compute_uv=False)[-1])
         self._ik_seconds = self._physics_seconds = 0.0
 
     @property

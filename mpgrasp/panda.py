@@ -46,8 +46,6 @@ TORQUE_MAX = _constant(87, 87, 87, 87, 12, 12, 12)
 """(7,) [N m]"""
 CARTESIAN_SPEED_MAX = 1.7
 """Translation of the tool [m/s]."""
-CARTESIAN_ACCELERATION_MAX = 13.0
-"""Translation of the tool [m/s2]."""
 
 TCP_OFFSET = 0.1034
 """From the hand frame to the tool point, along the approach axis [m]."""
@@ -57,8 +55,6 @@ FINGER_WIDTH = 0.0176
 """Width of a finger tip across the closing direction [m]."""
 FINGER_THICKNESS = 0.0144
 """Thickness of a finger tip along the closing direction [m]."""
-PAD_HEIGHT = 0.0178
-"""Height of the straight part of a finger tip, up from its end [m]."""
 GRIPPER_MAX_WIDTH = 0.08
 """Opening between the pads [m]."""
 GRIPPER_SPEED = 0.1

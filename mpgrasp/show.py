@@ -93,9 +93,17 @@ class _Jury:
         self.detectors = detectors
         self.views: list[DetectorView] = []
 
-    def reset(self, truth: HeightMap) -> None:
+    @property
+    def reads_truth(self) -> bool:
+        from mpgrasp.detectors.detector import reads_truth
+
+        return any(reads_truth(detector) for detector in self.detectors.values())
+
+    def reset(self, truth: HeightMap | None) -> None:
+        from mpgrasp.detectors.detector import reads_truth
+
         for detector in self.detectors.values():
-            detector.reset(truth)
+            detector.reset(truth if reads_truth(detector) else None)
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         self.views = [timed_view(name, detector, frame) for name, detector in self.detectors.items()]

@@ -36,7 +36,7 @@ class Painter:
     def __init__(self, crop: int = 350, size: int = 224, height: float = 1.0) -> None:
         self.crop, self.size, self.height = crop, size, height
 
-    def reset(self, truth: HeightMap) -> None: ...
+    def reset(self, truth: HeightMap | None) -> None: ...
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         image = crop_resize(frame, self.crop, self.size)

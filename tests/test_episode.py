@@ -28,7 +28,8 @@ class Blind:
 
     name = "blind"
 
-    def reset(self, truth: HeightMap) -> None: ...
+    def reset(self, truth: HeightMap | None) -> None:
+        self.truth = truth
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         nothing = np.zeros(frame.depth.shape, np.float32)
@@ -125,6 +126,16 @@ def test_without_noise_a_tick_repeats_itself() -> None:
     episode.ticks += 1
     np.testing.assert_array_equal(first, depth_of(episode))
     episode.close()
+
+
+def test_the_truth_is_told_to_none_but_who_declares_to_read_it() -> None:
+    blind = Blind()
+    Episode(SCENE, 5, detector=blind).close()
+    assert blind.truth is None
+    blind.reads_truth = True  # type: ignore[attr-defined]
+    Episode(SCENE, 5, detector=blind).close()
+    assert blind.truth is not None
+    assert (blind.truth.label > 0).any()
 
 
 def test_the_camera_starts_above_the_jittered_centre_looking_straight_down() -> None:

@@ -1,10 +1,8 @@
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
-from toy_views import INTRINSICS, Blob, blob_map, flat_map
+from toy_views import Blob, blob_map, flat_map
 
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
@@ -199,15 +197,3 @@ def test_a_remembered_failure_lowers_quality_around_it_only() -> None:
 def test_settings_that_make_no_grid_are_refused(settings: dict) -> None:
     with pytest.raises(ConfigError):
         GridConfig(**settings)
-
-
-def test_a_view_is_fused_in_a_few_milliseconds() -> None:
-    grid, blob = GridMap(), Blob(x=0.5, y=0.0)
-    view = blob_map(blob, looking_down([0.5, 0.0, 0.5], 0.3), np.random.default_rng(2))
-    assert view.intrinsics is INTRINSICS
-    laps = []
-    for _ in range(15):
-        begin = time.perf_counter()
-        grid.update(view)
-        laps.append(time.perf_counter() - begin)
-    assert min(laps) < 0.006  # 2 ms on an idle core

@@ -79,6 +79,11 @@ def test_the_detector_of_the_readme_runs() -> None:
     assert detector.predict(frame).quality.shape == (224, 224)
 
 
+def test_nothing_is_left_to_fill_in() -> None:
+    assert not re.findall(r"@[A-Z]+@", README)
+    assert len(load_table().rows()) >= 4
+
+
 def test_the_results_table_says_what_the_summaries_say() -> None:
     table = load_table()
     inside = README.split(table.BEGIN)[1].split(table.END)[0].strip()

@@ -164,6 +164,7 @@ def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
     """
     from mpgrasp.bench.provenance import provenance, sha256
     from mpgrasp.bench.world_card import world_card
+    from mpgrasp.detectors.detector import reads_truth
     from mpgrasp.paths import WEIGHTS
 
     return {
@@ -179,6 +180,7 @@ def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
                     "weights": str(given) if (given := plan.weights.get(name)) else None,
                     # of the shipped weights where none are given; a plug-in's own are its own affair
                     "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
+                    "reads_truth": reads_truth(detector),
                     "config": getattr(detector, "config", None),
                 }
                 for name, detector in player.detectors.items()

@@ -20,7 +20,6 @@ PACKAGES = (
     "mujoco",
     "numpy",
     "opencv-python-headless",
-    "openvino",
     "qpsolvers",
     "scipy",
     "torch",

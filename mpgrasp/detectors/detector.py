@@ -14,10 +14,18 @@ class GraspDetector(Protocol):
 
     name: str
 
-    def reset(self, truth: HeightMap) -> None:
-        """Start an episode. `truth` is the scene's true shape: the oracle alone may read it."""
+    def reset(self, truth: HeightMap | None) -> None:
+        """Start an episode. `truth` is the true shape for a detector that `reads_truth`, else None."""
         ...
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         """Grasp map of the frame; quality is zero everywhere where the image says nothing."""
         ...
+
+
+def reads_truth(detector: GraspDetector) -> bool:
+    """Whether the detector declares, by `reads_truth = True`, that it is told the scene's true shape.
+
+    The benchmark writes it into run.json: such a detector is a ceiling, not a competitor.
+    """
+    return bool(getattr(detector, "reads_truth", False))

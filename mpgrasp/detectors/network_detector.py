@@ -78,8 +78,8 @@ class NetworkDetector:
         """
         return cls(load_weights(name, weights), config)
 
-    def reset(self, truth: HeightMap) -> None:
-        """Start an episode; a network knows nothing but images, so `truth` is not looked at."""
+    def reset(self, truth: HeightMap | None) -> None:
+        """Start an episode; a network knows nothing but images."""
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         """Grasp map of the frame's central square; all quality is zero where the image says nothing."""

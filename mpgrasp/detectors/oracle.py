@@ -24,13 +24,22 @@ class OracleDetector:
     """
 
     name = "oracle"
+    reads_truth = True
 
     def __init__(self, hand: HandGeometry | None = None) -> None:
         self.hand = hand or HandGeometry()
         self._grasps: WorldGrasps | None = None
 
-    def reset(self, truth: HeightMap) -> None:
-        """Analyse the true shape of the scene."""
+    def reset(self, truth: HeightMap | None) -> None:
+        """Analyse the true shape of the scene.
+
+        Raises:
+            ConfigError: without a truth.
+        """
+        if truth is None:
+            raise ConfigError(
+                "the oracle was not told the true shape", allowed="reset(truth) with a height map"
+            )
         self._grasps = antipodal_grasps(truth, self.hand)
 
     def predict(self, frame: DepthFrame) -> GraspMap:
