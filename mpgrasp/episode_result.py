@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-import numpy as np
-
 from mpgrasp.grasp import Grasp
+from mpgrasp.plain import plain
 from mpgrasp.reflex import Reflex
 
 
@@ -64,8 +63,8 @@ class EpisodeResult:
         return self.outcome is Outcome.SUCCESS
 
     def as_record(self) -> dict[str, Any]:
-        """A JSON-ready dict with one key per field, `success` and plain numbers of 9 digits."""
-        return _plain(
+        """A JSON-ready dict with one key per field and `success`; floats have 9 digits."""
+        return plain(
             {
                 **{name: getattr(self, name) for name in self.__dataclass_fields__},
                 "outcome": self.outcome.value,
@@ -74,14 +73,3 @@ class EpisodeResult:
                 "grasp": None if self.grasp is None else asdict(self.grasp),
             }
         )
-
-
-def _plain(value: Any) -> Any:
-    """Numpy and mappings as JSON has them; floats to 9 significant digits."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return float(f"{value:.9g}") if isinstance(value, float) else value

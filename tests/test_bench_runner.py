@@ -13,12 +13,12 @@ import fakes
 import numpy as np
 import pytest
 
-from mpgrasp.bench.plain import difference, one_line, plain
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.run_directory import RunDirectory
 from mpgrasp.bench.runner import EpisodeError, Plan, Player, play_all
 from mpgrasp.bench.suite import episode_seed, load_suite
 from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
+from mpgrasp.plain import difference, one_line, plain
 
 DETECTOR, CONTROLLER = "fakes:FakeDetector", "fakes:FakeController"
 

@@ -16,7 +16,7 @@ PACKAGE = Path(mpgrasp.__file__).parent
 
 PERCEPTION, WORLD = "perception", "world"
 ROWS: dict[str, tuple[int, str]] = {
-    **dict.fromkeys(["exceptions", "paths", "geometry"], (1, "")),
+    **dict.fromkeys(["exceptions", "paths", "geometry", "plain"], (1, "")),
     **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp", "false_colour"], (2, "")),
     **dict.fromkeys(["detectors", "grid_map", "entropy"], (3, PERCEPTION)),
     **dict.fromkeys(["object_model", "objects", "terrain", "settling", "scene"], (3, WORLD)),

@@ -344,3 +344,15 @@ def test_scene_without_robot_is_refused() -> None:
 def test_unknown_object_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ConfigError, match="box_0"):
         Simulation(box_scene(SIZES[0])).object_pose("banana")
+
+
+def test_a_tip_that_stands_on_an_object_does_not_hold_it() -> None:
+    size = (0.06, 0.07, 0.03)
+    sim = Simulation(box_scene(size, mass=0.2))
+    above = np.array([CENTRE[0], CENTRE[1], size[2] + panda.FINGERTIP_BEYOND_TCP + 0.02])
+    q = put(sim, *above)
+    sim.open_gripper(0.03)
+    sim.step(400)
+    travel(sim, q, above, above - [0.0, 0.0, 0.0215], 0.05)
+    assert sim.finger_contact_force() > 1.0
+    assert sim.pad_contacts() == (set(), set())

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mpgrasp.bench.plain import difference, one_line, plain
 from mpgrasp.exceptions import OutputError
+from mpgrasp.plain import difference, one_line, plain
 
 
 class RunDirectory:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -161,9 +160,10 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
     try:
         # weights_only: a pickle from elsewhere must not run code
         state = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError, pickle.UnpicklingError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise WeightsError(f"weights cannot be read: {reason}", got=str(path)) from error
+    except Exception as error:  # torch names no common base for what a junk file may raise
+        raise WeightsError(
+            "not a PyTorch file of tensors", got=str(path), allowed="a published GG-CNN state dict"
+        ) from error
     if not isinstance(state, dict) or not all(isinstance(v, torch.Tensor) for v in state.values()):
         raise WeightsError("not a state dict", got=str(path), allowed="a published GG-CNN state dict")
     variant = 1 if "conv1.weight" in state else 2
