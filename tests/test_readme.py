@@ -84,13 +84,23 @@ def test_nothing_is_left_to_fill_in() -> None:
     assert len(load_table().rows()) >= 4
 
 
+def test_the_share_of_equal_outcomes_without_gl_is_the_published_runs() -> None:
+    def outcomes(run: str) -> list[tuple[int, str]]:
+        lines = (RESULTS / run / "episodes.jsonl").read_text().splitlines()
+        return [(line["episode"], line["outcome"]) for line in map(json.loads, lines)]
+
+    with_gl, without = outcomes("thin-dhrnet-mppc"), outcomes("without-gl/thin-dhrnet-mppc")
+    same = sum(a == b for a, b in zip(with_gl, without, strict=True))
+    assert f"the same in {same} of {len(without)} episodes" in README
+
+
 def test_the_results_table_says_what_the_summaries_say() -> None:
     table = load_table()
     inside = README.split(table.BEGIN)[1].split(table.END)[0].strip()
     assert inside == table.table()
 
 
-@pytest.mark.parametrize("path", sorted(RESULTS.glob("*/summary.json")), ids=lambda p: p.parent.name)
+@pytest.mark.parametrize("path", sorted(RESULTS.rglob("summary.json")), ids=lambda p: p.parent.name)
 def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
     lines = [json.loads(line) for line in (path.parent / "episodes.jsonl").read_text().splitlines()]
     run = json.loads((path.parent / "run.json").read_text())

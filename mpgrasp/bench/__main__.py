@@ -181,6 +181,7 @@ def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
                     # of the shipped weights where none are given; a plug-in's own are its own affair
                     "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
                     "reads_truth": reads_truth(detector),
+                    "device": getattr(detector, "device", None),
                     "config": getattr(detector, "config", None),
                 }
                 for name, detector in player.detectors.items()

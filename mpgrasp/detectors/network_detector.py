@@ -62,10 +62,10 @@ class NetworkDetector:
         self.name = weights.name
         self.weights = weights
         self.config = config or NetworkDetectorConfig()
-        self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.device = "cuda" if torch.cuda.is_available() else "cpu"
         network = _fold_batch_norms(copy.deepcopy(weights.network).eval())
         # convolutions on the CPU are a third faster with channels last
-        self._network = network.to(device=self._device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self._network = network.to(device=self.device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     @classmethod
     def load(
@@ -107,10 +107,10 @@ class NetworkDetector:
 
     def _heads(self, image: Float32) -> Float32:
         """Raw heads (4, size, size) for an input (channels, size, size)."""
-        x = torch.from_numpy(image)[None].to(self._device)
+        x = torch.from_numpy(image)[None].to(self.device)
         x = x.contiguous(memory_format=torch.channels_last)
         low = self.config.precision == "bfloat16"
-        with torch.inference_mode(), torch.autocast(self._device.type, torch.bfloat16, enabled=low):
+        with torch.inference_mode(), torch.autocast(self.device, torch.bfloat16, enabled=low):
             heads = self._network(x)
         return torch.cat(heads, dim=1)[0].float().cpu().numpy()
 
