@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from mpgrasp import panda
+from mpgrasp.driver import Driver
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.execution_config import ExecutionConfig
 from mpgrasp.geometry import FloatArray, looking_down
@@ -73,19 +74,37 @@ def execute_grasp(
     """
     if not np.all(np.isfinite([*grasp.position, grasp.angle, grasp.width])):
         raise ConfigError("grasp is not finite", got=(list(grasp.position), grasp.angle, grasp.width))
-    return _Execution(driver, grasp, config or ExecutionConfig(), on_tick).play()
+    told = None if on_tick is None else lambda phase: on_tick(phase, driver)
+    yaw = reachable_yaw(driver, grasp)
+    return Execution(driver, grasp, config or ExecutionConfig(), yaw=yaw, on_tick=told).play()
 
 
-class _Execution:
+class Execution:
+    """One execution, phase by phase.
+
+    Args:
+        driver: moves the hand.
+        grasp: what to grasp.
+        config: how.
+        yaw: heading of the hand's x axis [rad].
+        on_tick: is told the phase on every tick of the velocity loop.
+    """
+
     def __init__(
-        self, driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, on_tick: OnPhase | None
+        self,
+        driver: Driver,
+        grasp: Grasp,
+        config: ExecutionConfig,
+        *,
+        yaw: float,
+        on_tick: Callable[[str], None] | None = None,
     ) -> None:
-        self.driver, self.grasp, self.config, self._on_tick = driver, grasp, config, on_tick
+        self.driver, self.grasp, self.config, self.yaw = driver, grasp, config, yaw
+        self._on_tick = on_tick
         self.simulation = driver.simulation
         self.phase = PHASES[0]
         self.start = self.simulation.time
         self.rest = {name: float(self._height(name)) for name in self.simulation.scene.objects}
-        self.yaw = self._choose_yaw()
         # no deeper than the palm allows, nor than the table
         self.planned = max(-config.overtravel, float(grasp.position[2]) - config.palm_depth)
         self.contact_height: float | None = None
@@ -94,6 +113,7 @@ class _Execution:
         self.width = np.nan
 
     def play(self) -> ExecutionResult:
+        """Play all phases, or up to a protective stop, and judge."""
         for phase, act in (
             ("pregrasp", self._pregrasp), ("descend", self._descend), ("close", self._close),
             ("lift", self._lift), ("hold", self._hold), ("shake", self._shake),
@@ -201,20 +221,6 @@ class _Execution:
             return ExecutionResult(outcome="collision", reason=reason)
         return ExecutionResult(outcome="missed", reason="nothing stood between the closed pads")
 
-    def _choose_yaw(self) -> float:
-        """Heading of the hand's x axis: the nearer of the grasp's two, unless only the other is in reach."""
-        T = self.driver.T_desired
-        here = float(np.arctan2(T[1, 0], T[0, 0]))
-        near = nearest_yaw(self.grasp.angle + np.pi / 2, here)
-        for yaw in (near, near - np.copysign(np.pi, near - here)):
-            try:
-                self.driver.ik.solve(self.driver.q, looking_down(self.grasp.position, yaw))
-            except ConfigError:
-                continue
-            return float(yaw)
-        # out of reach either way: go as far as the protective stop allows and let it say why
-        return near
-
     def _pose(self, z: float) -> FloatArray:
         return looking_down([self.grasp.position[0], self.grasp.position[1], z], self.yaw)
 
@@ -228,12 +234,27 @@ class _Execution:
             target, speed, until=until, deceleration=self.config.contact_deceleration, on_tick=self._tick
         )
 
-    def _tick(self, driver: ArmDriver) -> None:
+    def _tick(self, driver: Driver) -> None:
         if self._on_tick is not None:
-            self._on_tick(self.phase, driver)
+            self._on_tick(self.phase)
 
     def _tip(self) -> float:
         return float(self.simulation.T_world_tcp[2, 3]) - panda.FINGERTIP_BEYOND_TCP
 
     def _height(self, name: str) -> float:
         return float(self.simulation.object_pose(name)[2, 3])
+
+
+def reachable_yaw(driver: ArmDriver, grasp: Grasp) -> float:
+    """Heading of the hand's x axis [rad]: the nearer one, unless only the other is in reach."""
+    T = driver.T_desired
+    here = float(np.arctan2(T[1, 0], T[0, 0]))
+    near = nearest_yaw(grasp.angle + np.pi / 2, here)
+    for yaw in (near, near - np.copysign(np.pi, near - here)):
+        try:
+            driver.ik.solve(driver.q, looking_down(grasp.position, yaw))
+        except ConfigError:
+            continue
+        return float(yaw)
+    # out of reach either way: go as far as the protective stop allows and let it say why
+    return near

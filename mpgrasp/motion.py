@@ -17,9 +17,10 @@ import numpy as np
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.ik import DifferentialIK, IkSolution
+from mpgrasp.pacing import paced_profile
 from mpgrasp.reflex import Reflex, ReflexMonitor
 from mpgrasp.simulation import Simulation
-from mpgrasp.trajectory import MotionConfig, TwistRamp, integrate_pose, path_profile, pose_error
+from mpgrasp.trajectory import MotionConfig, TwistRamp, integrate_pose, pose_error
 
 FORCE_WINDOW = 5
 """Ticks over which the external force is averaged before it can stop the arm. The arm weighs some 20 kg as
@@ -183,7 +184,7 @@ class ArmDriver:
         deceleration: float | None = None,
         on_tick: OnTick | None = None,
     ) -> bool:
-        """Move in a straight line to a pose (4, 4) and come to rest.
+        """Move in a straight line to a pose (4, 4) and come to rest, slower where the joints need it.
 
         Args:
             T_world_tcp: where to.
@@ -198,8 +199,8 @@ class ArmDriver:
         """
         self.stop(on_tick)
         start, error = self.T_desired, pose_error(self.T_desired, T_world_tcp)
-        shares = path_profile(
-            float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), self.config,
+        shares = paced_profile(
+            self.ik, self.q, start, error, self.config,
             max_speed or self.config.max_speed, max_rotation or self.config.max_rotation,
         )  # fmt: skip
         done = 0.0

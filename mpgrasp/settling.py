@@ -21,6 +21,10 @@ from mpgrasp.terrain import Cloth
 
 REGION_TOLERANCE = 0.03
 """An object may roll this far out of the region's edge before it is dropped again [m]."""
+STACK_SHIFT = 0.02
+"""An object of a stack that settles further from where it was set down has fallen [m]."""
+STACK_TILT = 0.15
+"""The same for its vertical axis [rad]."""
 STILL_SPEED = 0.002
 """Fastest linear motion of an object that counts as at rest [m/s]."""
 STILL_RATE = 0.03
@@ -32,6 +36,8 @@ _CALM_CHECKS = 4  # looks in a row that must find all at rest
 _ROUND_TIME = 2.0  # [s] of simulation before what still moves is dropped again
 _DROP_TIME = 0.4  # [s] of simulation between two drops of a pile
 _ROUNDS = 12
+_LOWERING = 0.001  # [m] by which an object of a stack comes down at a time
+_STACK_TRIES = 10  # jitters tried for a stack that stands
 _TRIES = 60  # random positions tried for a free spot
 _PARKED = 20.0  # [m] height at which objects wait for their drop
 
@@ -72,6 +78,56 @@ class Settler:
             self._step(_DROP_TIME)
         return self._settle(pile=True)
 
+    def stack(self, pattern: Sequence[Sequence[float]], jitter: tuple[float, float]) -> FloatArray:
+        """Set the objects down one after the other, each on what lies below it; poses (n, 7) at rest.
+
+        Args:
+            pattern: (n, 3) of each object: x, y from the centre [m] and heading [rad].
+            jitter: largest deviation of x and y [m], and of the heading [rad].
+        """
+        for _ in range(_STACK_TRIES):
+            fallen = self._try_stack(np.asarray(pattern, float), jitter)
+            if fallen is None:
+                return self.data.qpos[self._qpos[:, None] + np.arange(7)].copy()
+        raise ConfigError(
+            "the stack does not stand",
+            got=f"{fallen} left its place",
+            allowed=f"a pattern in which all come to rest within {STACK_SHIFT:g} m and {STACK_TILT:g} rad",
+        )
+
+    def _try_stack(self, pattern: FloatArray, jitter: tuple[float, float]) -> str | None:
+        """Name of an object that left its place or does not come to rest, if any."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._dropped[:] = False
+        shift = self.rng.uniform(-1, 1, (len(pattern), 3)) * [jitter[0], jitter[0], jitter[1]]
+        places = pattern + shift + [*self.centre, 0.0]
+        set_down = np.empty((len(places), 3))
+        self._park()
+        for k, (x, y, yaw) in enumerate(places):
+            self._put(k, np.array([x, y]), np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]))
+            self._lower(k)
+            set_down[k] = self._pose(k)[:3]
+            self._step(_DROP_TIME)
+        calm = self._step(_ROUND_TIME)
+        away = np.linalg.norm(self.data.qpos[self._qpos[:, None] + [0, 1, 2]] - set_down, axis=1)
+        tilt = np.arccos(np.clip(self.data.xmat[self._bodies, 8], -1, 1))
+        fall = np.maximum(away / STACK_SHIFT, tilt / STACK_TILT)
+        return None if calm and fall.max() <= 1 else str(self.names[int(np.argmax(fall))])
+
+    def _lower(self, k: int) -> None:
+        """Bring object k straight down until it all but touches something."""
+        height = self._qpos[k] + 2
+        while not self._touches(k):
+            self.data.qpos[height] -= _LOWERING
+        self.data.qpos[height] += _LOWERING
+
+    def _touches(self, k: int) -> bool:
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_collision(self.model, self.data)
+        bodies = self.model.geom_bodyid[self.data.contact.geom]  # (ncon, 2)
+        return bool((bodies == self._bodies[k]).any())
+
     def _settle(self, *, pile: bool) -> FloatArray:
         for _ in range(_ROUNDS):
             calm = self._step(_ROUND_TIME)
@@ -90,8 +146,10 @@ class Settler:
         )
 
     def _drop(self, k: int, spot: FloatArray) -> None:
-        """Put object k just above whatever lies at the spot (2,) [m]."""
-        quaternion = self._orientation()
+        """Put object k just above whatever lies at the spot (2,) [m], in an orientation drawn for it."""
+        self._put(k, spot, self._orientation())
+
+    def _put(self, k: int, spot: FloatArray, quaternion: FloatArray) -> None:
         points = self.objects[k].points @ rotation_of(quaternion).T
         radius = float(np.linalg.norm(points[:, :2], axis=1).max())
         ground = self.cloth.highest(float(spot[0]), float(spot[1]), radius)
@@ -147,11 +205,15 @@ class Settler:
         """Step for at most `time` [s]; whether all dropped objects came to rest before."""
         calm = 0
         for _ in range(round(time / self.model.opt.timestep / _CHECK_STEPS)):
-            for k in np.flatnonzero(~self._dropped):  # falls a few centimetres between two checks
-                self.data.qpos[self._qpos[k] : self._qpos[k] + 7] = [2.0 * k, 0, _PARKED, 1, 0, 0, 0]
-                self.data.qvel[self._dof[k] : self._dof[k] + 6] = 0
+            self._park()  # falls a few centimetres between two checks
             mujoco.mj_step(self.model, self.data, _CHECK_STEPS)
             calm = calm + 1 if self._still()[self._dropped].all() else 0
             if calm >= _CALM_CHECKS:
                 return True
         return False
+
+    def _park(self) -> None:
+        """Keep what was not dropped yet out of the way."""
+        for k in np.flatnonzero(~self._dropped):
+            self.data.qpos[self._qpos[k] : self._qpos[k] + 7] = [2.0 * k, 0, _PARKED, 1, 0, 0, 0]
+            self.data.qvel[self._dof[k] : self._dof[k] + 6] = 0

@@ -7,6 +7,7 @@ because MuJoCo's own step leaves poses and contacts one time step behind the joi
 from __future__ import annotations
 
 import hashlib
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from mpgrasp import panda
 from mpgrasp.contacts import Contacts
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.gripper_drive import GripperDrive
 
 if TYPE_CHECKING:
     from mpgrasp.scene import Scene
@@ -31,8 +33,8 @@ _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 class Snapshot:
     """Everything that decides the future of a simulation."""
 
-    state: NDArray[np.float64]
-    """MuJoCo's integration state."""
+    data: mujoco.MjData
+    """A copy; MuJoCo's integration state alone leaves out who sleeps, and what a sleeper's pose was."""
     q_target: FloatArray
     """(7,) [rad]"""
     dq_target: FloatArray
@@ -49,6 +51,9 @@ class Snapshot:
 
 class Simulation:
     """One scene in motion.
+
+    Objects at rest sleep until something that moves touches them. MuJoCo does not notice when a sleeper's
+    pose is written to `data`: give it a velocity, or `reset`.
 
     Args:
         scene: a built scene with the robot attached under the prefix `panda/`.
@@ -72,8 +77,7 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, self.scene.state, _STATE)
         panda.set_home(self.model, self.data)
-        self._grip_force: float | None = None
-        self._width_target = panda.GRIPPER_MAX_WIDTH
+        self._gripper.open(panda.GRIPPER_MAX_WIDTH)
         self._contact_torque: FloatArray = np.zeros(7)
         self.set_q(panda.Q_HOME)
 
@@ -82,7 +86,7 @@ class Simulation:
         torque = np.zeros(7)
         for _ in range(n):
             self._drive_arm()
-            self._drive_gripper()
+            self._gripper.update()
             mujoco.mj_step(self.model, self.data)
             torque += self._arm_constraint
         self._contact_torque = torque / max(n, 1)
@@ -150,12 +154,11 @@ class Simulation:
     @property
     def gripper_width(self) -> float:
         """Opening between the pads [m]."""
-        return float(self._finger_qpos[0] + self._finger_qpos[1])
+        return self._gripper.width
 
     def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
         """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at the hand's limits."""
-        self._grip_force = None
-        self._width_target = float(np.clip(width, 0.0, panda.GRIPPER_MAX_WIDTH))
+        self._gripper.open(width)
 
     def close_gripper(self, force: float = panda.GRIPPER_FORCE_DEFAULT) -> None:
         """Close at `panda.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
@@ -163,24 +166,7 @@ class Simulation:
         Raises:
             ConfigError: a force that the hand cannot hold continuously.
         """
-        if not panda.GRIPPER_FORCE_MIN <= force <= panda.GRIPPER_FORCE_MAX:
-            raise ConfigError(
-                "grip force out of range",
-                got=force,
-                allowed=f"{panda.GRIPPER_FORCE_MIN} to {panda.GRIPPER_FORCE_MAX} N",
-            )
-        self._grip_force = float(force)
-
-    def _drive_gripper(self) -> None:
-        reference = float(self._gripper_ctrl[0])
-        if self._grip_force is None:
-            limit = panda.GRIPPER_SPEED * self._dt
-            reference += min(max(self._width_target - reference, -limit), limit)
-        else:
-            # The servo pulls with its stiffness times the lag: let it lag by the force asked for.
-            floor = self.gripper_width - self._grip_force / self._gripper_stiffness
-            reference = max(reference - panda.GRIPPER_CLOSE_SPEED * self._dt, floor)
-        self._gripper_ctrl[0] = reference
+        self._gripper.close(force)
 
     def pad_contacts(self) -> tuple[set[str], set[str]]:
         """Names of the objects that press against the face of the left and of the right pad."""
@@ -227,25 +213,24 @@ class Simulation:
     def save(self) -> Snapshot:
         """Everything needed to come back to this instant."""
         return Snapshot(
-            state=self._state(),
+            data=copy(self.data),
             q_target=self._q_target.copy(),
             dq_target=self._dq_target.copy(),
             ramp_steps=self._ramp_steps,
-            grip_force=self._grip_force,
-            width_target=self._width_target,
+            grip_force=self._gripper.force,
+            width_target=self._gripper.target,
             contact_torque=self._contact_torque.copy(),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Come back to a saved instant; what follows is the same to the last bit."""
-        mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
+        mujoco.mj_copyData(self.data, self.model, snapshot.data)
         self._q_target = snapshot.q_target.copy()
         self._dq_target = snapshot.dq_target.copy()
         self._ramp_steps = snapshot.ramp_steps
-        self._grip_force = snapshot.grip_force
-        self._width_target = snapshot.width_target
+        self._gripper.force = snapshot.grip_force
+        self._gripper.target = snapshot.width_target
         self._contact_torque = snapshot.contact_torque.copy()
-        mujoco.mj_forward(self.model, self.data)
 
     def _state(self) -> NDArray[np.float64]:
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
@@ -255,14 +240,8 @@ class Simulation:
     def _index_robot(self) -> None:
         model, prefix = self.model, panda.PREFIX
         try:
-            first, finger = (
-                model.joint(prefix + panda.ARM_JOINTS[0]),
-                model.joint(prefix + panda.FINGER_JOINTS[0]),
-            )
-            arm, gripper = (
-                model.actuator(prefix + panda.ARM_JOINTS[0]).id,
-                model.actuator(prefix + "gripper").id,
-            )
+            first = model.joint(prefix + panda.ARM_JOINTS[0])
+            arm = model.actuator(prefix + panda.ARM_JOINTS[0]).id
             self._tcp = model.site(prefix + "tcp").id
         except KeyError as error:
             raise ConfigError(
@@ -271,11 +250,9 @@ class Simulation:
         # Joints and actuators of one robot follow one another; slices give views, quick to write to.
         self._qpos = slice(first.qposadr[0], first.qposadr[0] + 7)
         self._dofs = slice(first.dofadr[0], first.dofadr[0] + 7)
-        self._finger_qpos = self.data.qpos[finger.qposadr[0] : finger.qposadr[0] + 2]
         self._arm_ctrl = self.data.ctrl[arm : arm + 7]
-        self._gripper_ctrl = self.data.ctrl[gripper : gripper + 1]
+        self._gripper = GripperDrive(model, self.data)
         self._arm_constraint = self.data.qfrc_constraint[self._dofs]
         self._dt = float(model.opt.timestep)
-        self._gripper_stiffness = float(model.actuator_gainprm[gripper, 0])
         gain, bias = model.actuator_gainprm[arm : arm + 7], model.actuator_biasprm[arm : arm + 7]
         self._servo_lead = -bias[:, 2] / gain[:, 0]  # kv / kp [s]

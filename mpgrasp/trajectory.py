@@ -28,6 +28,12 @@ class MotionConfig:
     """Of pose moves [m/s]."""
     max_rotation: float = 1.5
     """Of pose moves [rad/s]."""
+    joint_fraction: float = 0.8
+    """Share of the FER's joint velocity and acceleration that a pose move may use; where it would need
+    more it slows down. Ordinary moves within the workspace use less than 0.7; what is left covers the
+    elbow's swing home, which is not planned."""
+    max_slowdown: float = 8.0
+    """The most by which a pose move slows down; what needs more ends in a protective stop."""
     singularity_warning: float = 0.05
     """Smallest singular value of the tool Jacobian (m, rad) below which time counts as near a singularity.
     At the controllers' 0.1 m/s a value of 0.046 = 0.1 / 2.175 is where the worst direction uses up a
@@ -41,6 +47,10 @@ class MotionConfig:
         ):  # fmt: skip
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        if not 0 < self.joint_fraction <= 1:
+            raise ConfigError("joint_fraction is a share", got=self.joint_fraction, allowed="(0, 1]")
+        if not self.max_slowdown >= 1:
+            raise ConfigError("max_slowdown is a factor", got=self.max_slowdown, allowed="1 or more")
         if self.smoothing < 1:
             raise ConfigError("smoothing counts ticks", got=self.smoothing, allowed="1 or more")
 
@@ -81,7 +91,7 @@ class TwistRamp:
 
 
 def path_profile(
-    length: float, angle: float, config: MotionConfig, speed: float, rotation: float
+    length: float, angle: float, config: MotionConfig, speed: float, rotation: float, slowdown: float = 1.0
 ) -> FloatArray:
     """Shares of a straight-line move after each tick, (n,), from just above 0 to 1.
 
@@ -94,17 +104,21 @@ def path_profile(
         config: accelerations, period and smoothing.
         speed: bound [m/s].
         rotation: bound [rad/s].
+        slowdown: how many times as long the move takes as these bounds would let it; 1 or more.
     """
     if length < 1e-9 and angle < 1e-9:
         return np.empty(0)
     v = min(speed / max(length, 1e-9), rotation / max(angle, 1e-9))  # share per second
     a = min(config.linear_acceleration / max(length, 1e-9), config.angular_acceleration / max(angle, 1e-9))
-    v = min(v, np.sqrt(a))  # a short move is a triangle
+    v = min(v, np.sqrt(a)) / slowdown  # a short move is a triangle
+    a /= slowdown**2
     duration = 1.0 / v + v / a
     t = np.arange(config.dt, duration + config.dt, config.dt)
     ramp = np.clip(np.minimum(a * t, a * (duration - t)), 0.0, v)
     velocity = np.convolve(ramp, np.full(config.smoothing, 1.0 / config.smoothing))
     share = np.cumsum(velocity)
+    if share[-1] <= 0:
+        return np.ones(1)  # a move so short that it fits into one tick
     return share / share[-1]
 
 

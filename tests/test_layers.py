@@ -24,6 +24,8 @@ ROWS: dict[str, tuple[int, str]] = {
         [
             "panda",
             "contacts",
+            "gripper_drive",
+            "free_gripper",
             "simulation",
             "rasteriser",
             "ray_caster",
@@ -33,14 +35,27 @@ ROWS: dict[str, tuple[int, str]] = {
             "ik",
             "reflex",
             "motion",
+            "pacing",
             "trajectory",
         ],
         (3, WORLD),
     ),
     "controllers": (4, ""),
     **dict.fromkeys(["film", "rerun_model", "rerun_recorder"], (5, "")),
-    **dict.fromkeys(["execution", "execution_config", "episode", "episode_result", "recording"], (5, "")),
-    **dict.fromkeys(["scene_file", "env", "bench", "training", "show"], (6, "")),
+    **dict.fromkeys(
+        [
+            "driver",
+            "execution",
+            "execution_config",
+            "lift_trial",
+            "episode",
+            "episode_metrics",
+            "episode_result",
+            "recording",
+        ],
+        (5, ""),
+    ),
+    **dict.fromkeys(["scene_file", "env", "bench", "training", "show", "runtime_check"], (6, "")),
 }
 FORBIDDEN = {
     PERCEPTION: {"mujoco", "mink"},
