@@ -1,4 +1,4 @@
-"""The wrist depth camera: the same image rasterised through OpenGL or ray-cast without any GL.
+"""The wrist camera: the same depth image rasterised through OpenGL or ray-cast without any; colour with GL.
 
 MuJoCo's camera axes (x right, y up, z backward) become OpenCV's (x right, y down, z forward) here and
 nowhere else.
@@ -45,10 +45,11 @@ class WristCamera:
         crop: side of the central square of the image that is wanted [px]; None for all of it. Nothing else is
             computed, apart from the margin that the noise needs, and frames have this size.
         geom_groups: the geom groups that are seen (MuJoCo's convention: 0-2 visual, 3-5 hidden).
+        colour: frames carry `rgb` too, which only GL can draw.
 
     Raises:
         ConfigError: unknown backend, or a crop larger than the image.
-        CameraError: backend "gl" without GL.
+        CameraError: backend "gl" without GL, or colour without it.
     """
 
     def __init__(
@@ -61,10 +62,14 @@ class WristCamera:
         intrinsics: CameraIntrinsics = D435_INTRINSICS,
         crop: int | None = None,
         geom_groups: tuple[int, ...] = (0, 1, 2),
+        colour: bool = False,
     ) -> None:
         if backend not in BACKENDS:
             raise ConfigError("unknown camera backend", got=backend, allowed=BACKENDS)
+        if colour:
+            _require_colour(backend)
         self.backend: Literal["gl", "ray"] = "ray" if backend == "ray" or not _gl_usable(backend) else "gl"
+        self.colour = colour
         self.noise = noise
         self.intrinsics = intrinsics if crop is None else intrinsics.centre_crop(crop)
         # the shadow of an edge depends on what lies to its right, so that much more is looked at
@@ -76,6 +81,7 @@ class WristCamera:
         self._ray_caster: RayCaster | None = None
         self._depth_rasteriser: Rasteriser | None = None
         self._colour_rasteriser: Rasteriser | None = None
+        self._fine_rasteriser: Rasteriser | None = None
 
     def pose(self, data: mujoco.MjData) -> FloatArray:
         """`T_world_camera` (4, 4) of the model's camera, OpenCV axes, as of the last forward kinematics."""
@@ -100,33 +106,63 @@ class WristCamera:
     ) -> DepthFrame:
         """Depth from an OpenCV camera at `T_world_camera` (4, 4); with the sensor's noise if `rng` is."""
         depth = self._depth(data, T_world_camera)
-        if rng is not None and self.noise is not None:
-            depth = sensor_noise.apply(depth, self._seen, rng, self.noise)
-        depth = np.ascontiguousarray(depth[:, : self.intrinsics.width])
-        return DepthFrame(
-            depth=depth, intrinsics=self.intrinsics, T_world_camera=T_world_camera, time=float(data.time)
-        )
+        if rng is not None:
+            depth = self._measured(depth, rng)
+        return self._frame(data, T_world_camera, depth)
+
+    def render_both(
+        self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator
+    ) -> tuple[DepthFrame, DepthFrame]:
+        """What the sensor reports from `T_world_camera` (4, 4), and the perfect depth of the same image."""
+        true = self._depth(data, T_world_camera)
+        reported = self._frame(data, T_world_camera, self._measured(true, rng))
+        return reported, replace(reported, depth=self._window(true))
 
     def rgb(self, data: mujoco.MjData, T_world_camera: FloatArray | None = None) -> NDArray[np.uint8]:
-        """Colour image (H, W, 3) with the geometry of the frames, for recordings; needs GL.
+        """Colour image (H, W, 3) with the geometry of the frames, shadows and all, for recordings; needs GL.
 
         Raises:
             CameraError: there is no GL on this machine.
         """
-        if self._colour_rasteriser is None:
-            self._colour_rasteriser = Rasteriser(
-                self._model, self.intrinsics, colour=True, geom_groups=self._geom_groups
+        if self._fine_rasteriser is None:
+            self._fine_rasteriser = Rasteriser(
+                self._model, self.intrinsics, colour=True, fine=True, geom_groups=self._geom_groups
             )
-        return self._colour_rasteriser.render(
+        return self._fine_rasteriser.render(
             data, self.pose(data) if T_world_camera is None else T_world_camera
         )
 
     def close(self) -> None:
         """Free GL resources; a later image makes new ones."""
-        for rasteriser in (self._depth_rasteriser, self._colour_rasteriser):
+        for rasteriser in (self._depth_rasteriser, self._colour_rasteriser, self._fine_rasteriser):
             if rasteriser is not None:
                 rasteriser.close()
-        self._depth_rasteriser = self._colour_rasteriser = None
+        self._depth_rasteriser = self._colour_rasteriser = self._fine_rasteriser = None
+
+    def _frame(
+        self, data: mujoco.MjData, T_world_camera: FloatArray, depth: NDArray[np.float32]
+    ) -> DepthFrame:
+        return DepthFrame(
+            depth=self._window(depth),
+            intrinsics=self.intrinsics,
+            T_world_camera=T_world_camera,
+            time=float(data.time),
+            rgb=self._colour_image(data, T_world_camera) if self.colour else None,
+        )
+
+    def _window(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The part of an image that is wanted, without the margin that the noise needs."""
+        return np.ascontiguousarray(depth[:, : self.intrinsics.width])
+
+    def _measured(self, depth: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
+        return depth if self.noise is None else sensor_noise.apply(depth, self._seen, rng, self.noise)
+
+    def _colour_image(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.uint8]:
+        if self._colour_rasteriser is None:
+            self._colour_rasteriser = Rasteriser(
+                self._model, self.intrinsics, colour=True, geom_groups=self._geom_groups
+            )
+        return self._colour_rasteriser.render(data, T_world_camera)
 
     def _depth(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.float32]:
         if self.backend == "ray":
@@ -136,6 +172,13 @@ class WristCamera:
         if self._depth_rasteriser is None:
             self._depth_rasteriser = Rasteriser(self._model, self._seen, geom_groups=self._geom_groups)
         return self._depth_rasteriser.render(data, T_world_camera)
+
+
+def _require_colour(backend: str) -> None:
+    """Raise a CameraError where frames cannot have colour."""
+    if backend == "ray":
+        raise CameraError("rays see no colour", got='backend "ray"', allowed='backend "gl", or no colour')
+    require_gl()
 
 
 def _gl_usable(backend: str) -> bool:

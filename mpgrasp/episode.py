@@ -17,7 +17,8 @@ import numpy as np
 from mpgrasp.camera import BACKENDS, WristCamera
 from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors.detector import GraspDetector, reads_truth
+from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
+from mpgrasp.episode_metrics import ReachMetrics
 from mpgrasp.episode_result import EpisodeResult, Outcome
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.execution import execute_grasp
@@ -94,7 +95,8 @@ def run_episode(
 
     Raises:
         ConfigError: a scene that cannot be built.
-        CameraError: a camera backend that this machine does not have.
+        CameraError: a camera backend that this machine does not have, or that has no colour for a detector
+            that reads it.
     """
     episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
     try:
@@ -147,10 +149,12 @@ class Episode:
             self.config.camera_backend,
             DepthNoise() if self.config.noise else None,
             crop=self.config.camera_crop,
+            colour=reads_colour(detector),
         )
         self.simulation.set_q(self._start_q())
         self.driver = ArmDriver(self.simulation)
         self.start_time = self.simulation.time
+        self.metrics = ReachMetrics()
         self.ticks = 0
         self.frame: DepthFrame | None = None
         """What the camera saw at the last look."""
@@ -168,8 +172,10 @@ class Episode:
             self.frame = self.camera.capture(self.simulation.data, rng)
         with self.timed("detect"):
             self._grasp_map = self.detector.predict(self.frame)
+        time_s = self.simulation.time - self.start_time
+        self.metrics.look(time_s, self._grasp_map)
         return Observation(
-            time=self.simulation.time - self.start_time,
+            time=time_s,
             T_world_tcp=self.simulation.T_world_tcp,
             grasp_map=self._grasp_map,
         )
@@ -180,7 +186,7 @@ class Episode:
         self.simulation.open_gripper(command.gripper)
         before = self.driver.statistics()
         if not command.done:
-            self.driver.drive(command.twist, self.config.control_dt)
+            self.driver.drive(command.twist, self.config.control_dt, self.metrics.tick)
             after = self.driver.statistics()
             self._times["ik"].append(after.ik_seconds - before.ik_seconds)
             self._times["physics"].append(after.physics_seconds - before.physics_seconds)
@@ -242,6 +248,9 @@ class Episode:
             near_singularity_s=whole.near_singularity,
             path_length_m=reach.path_length,
             jerk_rms=reach.jerk_rms,
+            spectral_arc_length=self.metrics.spectral_arc_length,
+            first_detection_s=self.metrics.first_detection_s,
+            blind_drift_m=self.metrics.blind_drift_m,
             grasp=self._grasp,
             timing={stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES},
             state_hash=self.simulation.state_hash(),

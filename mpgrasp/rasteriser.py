@@ -84,7 +84,7 @@ def _new_gl_context() -> Any:
 
 
 @contextlib.contextmanager
-def _visual_settings(model: mujoco.MjModel, width: int, height: int, colour: bool) -> Iterator[None]:
+def _visual_settings(model: mujoco.MjModel, width: int, height: int, fine: bool) -> Iterator[None]:
     """Have the model ask for a buffer of our size while a context is made from it, then restore it."""
     glob, quality = model.vis.global_, model.vis.quality
     kept = (
@@ -96,8 +96,8 @@ def _visual_settings(model: mujoco.MjModel, width: int, height: int, colour: boo
         quality.numstacks,
     )
     glob.offwidth, glob.offheight = width, height
-    quality.offsamples = _COLOUR_SAMPLES if colour else 0
-    quality.shadowsize = _SHADOW_MAP if colour else 0
+    quality.offsamples = _COLOUR_SAMPLES if fine else 0
+    quality.shadowsize = _SHADOW_MAP if fine else 0
     quality.numslices, quality.numstacks = _SLICES, _SLICES
     try:
         yield
@@ -118,7 +118,8 @@ class Rasteriser:
     Args:
         model: the world to draw.
         intrinsics: geometry of the image.
-        colour: draw colour (multisampled, with shadows) instead of depth.
+        colour: draw colour instead of depth.
+        fine: colour multisampled and with shadows, for people to look at, in place of quick and plain.
         geom_groups: the geom groups that are seen.
 
     Raises:
@@ -131,14 +132,16 @@ class Rasteriser:
         intrinsics: CameraIntrinsics,
         *,
         colour: bool = False,
+        fine: bool = False,
         geom_groups: tuple[int, ...] = (0, 1, 2),
     ) -> None:
+        fine = fine and colour
         self._model = model
         self._intrinsics = intrinsics
         self._colour = colour
         # A GL context of its own: two MuJoCo contexts in one GL context draw into each other's buffers.
         self._gl = _new_gl_context()
-        with _visual_settings(model, intrinsics.width, intrinsics.height, colour):
+        with _visual_settings(model, intrinsics.width, intrinsics.height, fine):
             self._context: mujoco.MjrContext | None = mujoco.MjrContext(
                 model, mujoco.mjtFontScale.mjFONTSCALE_50.value
             )
@@ -151,9 +154,10 @@ class Rasteriser:
         for decoration in ("sitegroup", "jointgroup", "tendongroup", "actuatorgroup"):
             getattr(self._option, decoration)[:] = 0
         self._free_camera = mujoco.MjvCamera()
+        flags = self._scene.flags
         if not colour:
-            flags = self._scene.flags
             flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
+        if not fine:
             flags[mujoco.mjtRndFlag.mjRND_SHADOW] = flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
 
     def render(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[Any]:

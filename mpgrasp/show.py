@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mpgrasp.grasp import GraspMap
     from mpgrasp.height_map import HeightMap
 
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+EXIT_DISAGREEMENT, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 _REPEATS = 5  # predictions that are timed once a detector is warm
 _MAX_HEIGHT = 1.0  # [m]
@@ -99,6 +99,12 @@ class _Jury:
 
         return any(reads_truth(detector) for detector in self.detectors.values())
 
+    @property
+    def reads_colour(self) -> bool:
+        from mpgrasp.detectors.detector import reads_colour
+
+        return any(reads_colour(detector) for detector in self.detectors.values())
+
     def reset(self, truth: HeightMap | None) -> None:
         from mpgrasp.detectors.detector import reads_truth
 
@@ -152,7 +158,7 @@ def card(name: str, weights: Path | None) -> dict[str, Any]:
     from mpgrasp.bench.plugins import load_detector
     from mpgrasp.paths import WEIGHTS
 
-    loaded: Any = getattr(load_detector(name, weights), "weights", None)
+    loaded: Any = getattr(load_detector(name, weights, "torch"), "weights", None)
     if not hasattr(loaded, "card"):
         raise ConfigError("a detector without a training card", got=name, allowed="a network, such as dhrnet")
     return {
@@ -170,6 +176,7 @@ def _run_show(options: argparse.Namespace) -> None:
     from PIL import Image
 
     from mpgrasp.bench.plugins import load_detector, parse_weights
+    from mpgrasp.detectors.detector import prepare
     from mpgrasp.detectors.pictures import side_by_side
     from mpgrasp.recording import claim_file
 
@@ -186,7 +193,10 @@ def _run_show(options: argparse.Namespace) -> None:
         noise=not options.no_noise,
     )
     weights = parse_weights(options.weights, names)
-    frame, views = look(view, {name: load_detector(name, weights.get(name)) for name in names})
+    detectors = {name: load_detector(name, weights.get(name), options.runtime) for name in names}
+    for line in filter(None, map(prepare, detectors.values())):
+        print(line)
+    frame, views = look(view, detectors)
     picture = side_by_side(frame, views, view.caption())
     try:
         Image.fromarray(picture).save(claim_file(options.out, (".png",)), optimize=True)
@@ -196,6 +206,37 @@ def _run_show(options: argparse.Namespace) -> None:
         name, *rest = shown.lines()
         print(f"{name}: {', '.join(rest).replace(',  ', ', ')}; first call {shown.first_milliseconds:.0f} ms")
     print(f"Picture: {options.out}")
+
+
+def _run_check(options: argparse.Namespace) -> int:
+    from mpgrasp.bench.plugins import load_detector
+    from mpgrasp.detectors.network_detector import NetworkDetector
+    from mpgrasp.detectors.runtime import TorchRuntime
+    from mpgrasp.runtime_check import MAX_ANGLE, MAX_DISTANCE, compare, rendered_frames
+
+    detector = load_detector(options.detector, options.weights, options.runtime)
+    if not isinstance(detector, NetworkDetector):
+        raise ConfigError("a detector without a runtime", got=options.detector, allowed="a network's name")
+    frames = list(
+        rendered_frames(
+            options.suite,
+            options.frames,
+            options.seed,
+            camera=options.camera,
+            colour=detector.reads_colour,
+        )
+    )
+    detector.warm_up()
+    print(detector.readiness)
+    plain = NetworkDetector(detector.weights, runtime=TorchRuntime(detector.weights, plain=True))
+    found = compare(detector, plain, frames)
+    fast, slow = found.milliseconds
+    print(
+        f"top grasp within {MAX_DISTANCE:g} px and {np.rad2deg(MAX_ANGLE):g} degrees of plain torch on"
+        f" {found.same} of {len(frames)} frames ({100 * found.share:.1f} %);"
+        f" {fast:.1f} ms a frame, plain torch {slow:.1f} ms"
+    )
+    return 0 if found.good else EXIT_DISAGREEMENT
 
 
 def _print_card(about: Mapping[str, Any], indent: str = "") -> None:
@@ -213,6 +254,8 @@ def main(parser: argparse.ArgumentParser, command: Sequence[str] | None = None) 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         options = parser.parse_args(command)
+        if options.command == "check":
+            return _run_check(options)
         if options.command == "show":
             _run_show(options)
         else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from height_maps import Solid, height_map
 
-from mpgrasp.detectors.antipodal import HandGeometry, WorldGrasps, antipodal_grasps
+from mpgrasp.detectors.antipodal import HandGeometry, WorldGrasps, antipodal_grasps, quality_along
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference
 
@@ -156,6 +156,28 @@ def test_the_cells_size_changes_little() -> None:
     )
     assert abs(coarse[4] - fine[4]) < 0.15
     assert line_angle_difference(coarse[2], fine[2]) < np.deg2rad(4)
+
+
+def test_along_one_direction_there_are_grasps_only_if_it_crosses_the_stick() -> None:
+    stick = Solid(x=0.5, y=0.0, yaw=0.3, length=0.12, breadth=0.02, height=0.02)
+    truth = height_map(stick)
+    across, along = (quality_along(truth, 0.3 + turn) for turn in (QUARTER, 0.0))
+    assert across.shape == truth.height.shape
+    assert across.max() > 0.5
+    assert not along.any()
+    assert not quality_along(height_map(), 0.3).any()
+
+
+def test_something_tall_far_away_changes_no_grasp() -> None:
+    low = Solid(x=0.42, y=0.0, yaw=0.3, length=0.08, breadth=0.02, height=0.02)
+    tower = Solid(x=0.62, y=0.1, yaw=0.0, length=0.02, breadth=0.02, height=0.035)
+    alone, both = (antipodal_grasps(height_map(*solids)) for solids in ((low,), (low, tower)))
+    both.quality[both.height_map.label != 1] = 0
+    (x0, y0, a0, w0, q0), (x1, y1, a1, w1, q1) = best(alone), best(both)
+    assert np.hypot(x1 - x0, y1 - y0) < 0.02  # the best places along the stick are nearly alike
+    assert line_angle_difference(a1, a0) < np.deg2rad(4)
+    assert abs(w1 - w0) < 0.003
+    assert abs(q1 - q0) < 0.1
 
 
 def test_bad_hands_are_refused() -> None:

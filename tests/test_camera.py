@@ -226,6 +226,64 @@ def test_colour_images_have_the_geometry_of_the_frames(world) -> None:
 
 
 @needs_gl
+@pytest.mark.parametrize("crop", [None, 100])
+def test_coloured_frames_show_in_colour_what_they_show_in_depth(world, crop: int | None) -> None:
+    model, data = world
+    plain, coloured = (
+        WristCamera(model, "gl", intrinsics=SMALL, crop=crop, colour=colour) for colour in (False, True)
+    )
+    frames = [c.capture(data, np.random.default_rng(0)) for c in (plain, coloured)]
+    assert frames[0].rgb is None
+    rgb = frames[1].rgb
+    assert rgb is not None
+    assert rgb.shape == (*frames[1].depth.shape, 3)
+    assert rgb.dtype == np.uint8
+    assert np.array_equal(frames[0].depth, frames[1].depth, equal_nan=True)
+    true = coloured.true_frame(data).depth
+    # where depth jumps there is an edge in colour too, more often than elsewhere
+    jump = np.abs(np.diff(true, axis=1)) > 0.01
+    step = np.abs(np.diff(rgb.astype(int).sum(axis=2), axis=1))
+    assert step[jump].mean() > 3 * step[~jump].mean()
+    plain.close()
+    coloured.close()
+
+
+@needs_gl
+def test_reported_and_true_image_of_one_look_are_those_of_two(world) -> None:
+    model, data = world
+    camera = WristCamera(model, "gl", intrinsics=SMALL, crop=100)
+    T = camera.pose(data)
+    reported, true = camera.render_both(data, T, np.random.default_rng(4))
+    assert np.array_equal(
+        reported.depth, camera.render(data, T, np.random.default_rng(4)).depth, equal_nan=True
+    )
+    assert np.array_equal(true.depth, camera.render(data, T).depth, equal_nan=True)
+    camera.close()
+
+
+@needs_gl
+def test_the_crop_and_resize_of_colour_follow_those_of_depth(world) -> None:
+    model, data = world
+    camera = WristCamera(model, "gl", None, intrinsics=SMALL, colour=True)
+    image = crop_resize(camera.true_frame(data), crop=100, size=50)
+    assert image.rgb is not None
+    assert image.rgb.shape == (50, 50, 3)
+    whole = camera.true_frame(data).rgb
+    assert whole is not None
+    mean = whole[10:110, 30:130].reshape(50, 2, 50, 2, 3).mean(axis=(1, 3))
+    assert np.abs(image.rgb - mean).max() <= 1
+    camera.close()
+
+
+def test_colour_without_gl_is_refused(world, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(CameraError, match="no colour"):
+        WristCamera(world[0], "ray", colour=True)
+    monkeypatch.setattr(rasteriser, "_gl_error", lambda: CameraError("broken"))
+    with pytest.raises(CameraError, match="broken"):
+        WristCamera(world[0], "auto", colour=True)
+
+
+@needs_gl
 def test_cameras_side_by_side_do_not_disturb_each_other(world) -> None:
     model, data = world
     other = mujoco.MjModel.from_xml_string(

@@ -54,8 +54,8 @@ def test_every_parameter_learns() -> None:
 
 
 def test_a_pixel_is_seen_across_the_whole_image() -> None:
-    network = DHRNet(DHRNetConfig(**SMALL)).eval()
     torch.manual_seed(0)
+    network = DHRNet(DHRNetConfig(**SMALL)).eval()
     x = torch.randn(1, 1, 128, 128, requires_grad=True)
     network(x)[0][0, 0, 64, 64].backward()
     assert x.grad is not None
@@ -63,16 +63,42 @@ def test_a_pixel_is_seen_across_the_whole_image() -> None:
     assert rows.max() - rows.min() > 100
 
 
-def test_heads_see_fine_and_coarse_branches() -> None:
-    network = DHRNet(DHRNetConfig(**SMALL)).eval()
+@pytest.mark.parametrize(("head", "sides"), [("all", [16, 8, 4, 2]), ("lower", [8, 4, 2]), ("highest", [16])])
+def test_heads_see_the_branches_that_they_are_meant_to(head: str, sides: list[int]) -> None:
+    network = DHRNet(DHRNetConfig(**SMALL, head=head, fine_head=False)).eval()
     seen: list[int] = []
     network.head.register_forward_hook(lambda _, args, __: seen.extend(b.shape[-1] for b in args[0]))
     with torch.inference_mode():
         network(torch.randn(1, 1, 64, 64))
-    assert seen == [16, 8, 4, 2]
+    assert seen == sides
 
 
-@pytest.mark.parametrize("bad", [{"width": 0}, {"modules": (1, 1)}, {"blocks": 0}, {"channels": 0}])
+def test_the_ablated_heads_leave_the_rest_of_the_network_as_it_is() -> None:
+    def entries(head: str) -> dict[str, torch.Size]:
+        state = DHRNet(DHRNetConfig(**SMALL, head=head, fine_head=False)).state_dict()
+        return {k: v.shape for k, v in state.items() if not k.startswith(("head.", "stages.2.0.fuse."))}
+
+    assert entries("all") == entries("lower") == entries("highest")
+
+
+def test_without_the_finest_branch_maps_are_no_finer_than_an_eighth() -> None:
+    network = DHRNet(DHRNetConfig(**SMALL, head="lower", fine_head=False)).eval()
+    with torch.inference_mode():
+        pos = network(torch.randn(1, 1, 64, 64))[0][0, 0]
+    # bilinear from 8x8 pixels: no bends but at their centres, so second differences between those are zero
+    bends = pos.diff(n=2, dim=1).abs().amax(dim=0)
+    assert bends[[c for c in range(62) if (c + 1 - 3) % 8 > 1]].max() < 1e-4 * bends.max()
+
+
+@pytest.mark.parametrize(
+    "bad", [{"width": 0}, {"modules": (1, 1)}, {"blocks": 0}, {"channels": 0}, {"head": "upper"}]
+)
 def test_settings_that_make_no_network_are_refused(bad: dict) -> None:
     with pytest.raises(ConfigError):
         DHRNetConfig(**bad)
+
+
+@pytest.mark.parametrize("head", ["lower", "highest"])
+def test_a_head_that_leaves_branches_out_has_no_fine_head_beside_it(head: str) -> None:
+    with pytest.raises(ConfigError, match=r"fine head.*fine_head=False"):
+        DHRNetConfig(head=head)

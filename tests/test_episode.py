@@ -14,9 +14,10 @@ from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors import make_detector
 from mpgrasp.episode import Episode, EpisodeConfig, run_episode
 from mpgrasp.episode_result import Outcome
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.height_map import HeightMap
+from mpgrasp.rasteriser import require_gl
 from mpgrasp.scene import WORKSPACE_CENTRE, SceneConfig
 
 SCENE = SceneConfig(objects=("usb_stick",), half_extent=0.08)
@@ -80,6 +81,36 @@ def depth_of(episode: Episode) -> np.ndarray:
 @pytest.fixture(scope="module")
 def oracle() -> object:
     return make_detector("oracle")
+
+
+class SeesColour(Blind):
+    """A detector that asks for colour, and keeps it."""
+
+    name = "sees_colour"
+    reads_colour = True
+    rgb: np.ndarray | None = None
+
+    def predict(self, frame: DepthFrame) -> GraspMap:
+        self.rgb = frame.rgb
+        return super().predict(frame)
+
+
+def test_a_detector_that_reads_colour_gets_it_or_the_episode_does_not_start() -> None:
+    detector = SeesColour()
+    with pytest.raises(CameraError, match="colour"):
+        Episode(SCENE, 0, detector=detector, config=replace(QUICK, camera_backend="ray"))
+    assert detector.rgb is None
+    try:
+        require_gl()
+    except CameraError:
+        pytest.skip("no OpenGL here")
+    episode = Episode(SCENE, 0, detector=detector)
+    depth = depth_of(episode)
+    episode.close()
+    assert detector.rgb is not None
+    assert detector.rgb.shape == (*depth.shape, 3)
+    assert np.ptp(detector.rgb) > 20
+    np.testing.assert_array_equal(depth_of(start(0)), depth)  # colour changes nothing about the depth
 
 
 def test_the_same_seed_gives_the_same_record_but_for_timing(oracle) -> None:

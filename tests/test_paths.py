@@ -51,3 +51,19 @@ def test_a_wheel_carries_all_that_the_checkout_offers(tmp_path: Path) -> None:
     root, *suites = listed.split("|")
     assert Path(root) == tmp_path / "site" / "mpgrasp" / "_data"
     assert {"thin", "unseen"} <= set(suites)
+
+
+def test_the_cache_is_where_the_environment_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for name in ("MPGRASP_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    assert paths.cache_folder() == tmp_path / "home" / ".cache" / "mpgrasp"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative/paths/do/not/count")
+    assert paths.cache_folder() == tmp_path / "home" / ".cache" / "mpgrasp"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "shared"))
+    assert paths.cache_folder() == tmp_path / "shared" / "mpgrasp"
+    monkeypatch.setenv("MPGRASP_CACHE", str(tmp_path / "own"))
+    assert paths.cache_folder() == tmp_path / "own"
+    monkeypatch.setenv("MPGRASP_CACHE", "~/own")
+    assert paths.cache_folder() == tmp_path / "home" / "own"
+    assert not list(tmp_path.iterdir())

@@ -145,7 +145,7 @@ def test_a_height_that_cannot_be_is_refused(height: float) -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ([], "required: show|card"),
+        ([], "required: show|check|card"),
         (["show", "resnet"], "unknown detector; got 'resnet'"),
         (["show", "oracle,oracle"], "unusable list of detectors"),
         (["show", "oracle", "--suite", "thick"], "unknown suite"),
@@ -176,13 +176,13 @@ def test_a_card_tells_the_network_and_how_it_was_trained(
     from mpgrasp.detectors.weights import NetworkWeights, build_network, save_weights
 
     file = tmp_path / "some.safetensors"
-    network = build_network("ggcnn", {})
+    network = build_network("ggcnn2", {})
     save_weights(
-        file, NetworkWeights(name="ggcnn", network=network, settings={}, card={"loss": {"beta": 0.2}})
+        file, NetworkWeights(name="ggcnn2", network=network, settings={}, card={"loss": {"beta": 0.2}})
     )
-    assert main(make_parser(), ["card", "ggcnn", "--weights", str(file)]) == 0
+    assert main(make_parser(), ["card", "ggcnn2", "--weights", str(file)]) == 0
     printed = capsys.readouterr().out
-    assert "network: ggcnn\n" in printed
+    assert "network: ggcnn2\n" in printed
     assert f"parameters: {sum(p.numel() for p in network.parameters())}\n" in printed
     assert "training:\n  loss:\n    beta: 0.2\n" in printed
     assert main(make_parser(), ["card", "dhrnet", "--weights", str(file)]) == 2

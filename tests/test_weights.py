@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 import torch
-from safetensors.torch import save_file
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
 
 from mpgrasp.detectors.network_input import NetworkInput
 from mpgrasp.detectors.weights import (
@@ -15,16 +16,17 @@ from mpgrasp.detectors.weights import (
     load_weights,
     read_card,
     save_weights,
+    width_unit,
 )
 from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 
-SETTINGS = {"width": 4, "stem_width": 4, "head_width": 4, "blocks": 1, "channels": 2}
-INPUT = NetworkInput(centre="median", scale=20.0, range_channel=True)
+SETTINGS = {"width": 4, "stem_width": 4, "head_width": 4, "blocks": 1, "channels": 3}
+INPUT = NetworkInput(modality="rgb", centre="median", scale=20.0)
 
 
 def small(name: str = "dhrnet") -> NetworkWeights:
     torch.manual_seed(0)
-    settings = SETTINGS if name == "dhrnet" else {"channels": 2}
+    settings = SETTINGS if name == "dhrnet" else {"channels": 3}
     return NetworkWeights(
         name=name,
         network=build_network(name, settings),
@@ -34,7 +36,7 @@ def small(name: str = "dhrnet") -> NetworkWeights:
     )
 
 
-@pytest.mark.parametrize("name", ["dhrnet", "ggcnn"])
+@pytest.mark.parametrize("name", ["dhrnet", "ggcnn2"])
 def test_weights_come_back_as_they_were_saved(name: str, tmp_path: Path) -> None:
     weights = small(name)
     save_weights(tmp_path / "deep" / "w.safetensors", weights)
@@ -49,16 +51,47 @@ def test_weights_come_back_as_they_were_saved(name: str, tmp_path: Path) -> None
     assert read_card(tmp_path / "deep" / "w.safetensors")["network"] == name
 
 
-@pytest.mark.parametrize(("variant", "size"), [(1, 300), (2, 224)])
-def test_published_state_dicts_load_unchanged(variant: int, size: int, tmp_path: Path) -> None:
-    network = build_network("ggcnn", {"variant": variant})
-    torch.save(network.state_dict(), tmp_path / "published.pt")
-    weights = load_weights("ggcnn", tmp_path / "published.pt")
-    assert weights.settings == {"variant": variant}
-    assert weights.input == NetworkInput(size=size, centre="mean", clip=1.0, scale=1.0, range_channel=False)
+@pytest.mark.parametrize(("name", "size"), [("ggcnn", 300), ("ggcnn2", 224)])
+@pytest.mark.parametrize("suffix", ["pt", "pth"])
+def test_published_state_dicts_load_unchanged(name: str, size: int, suffix: str, tmp_path: Path) -> None:
+    network = build_network(name, {})
+    torch.save(network.state_dict(), tmp_path / f"published.{suffix}")
+    weights = load_weights(name, tmp_path / f"published.{suffix}")
+    assert weights.name == name
+    assert weights.settings == {}
+    assert weights.input == NetworkInput(size=size, centre="mean", clip=1.0, scale=1.0)
     assert weights.width_px == 150.0
     for key, value in network.state_dict().items():
         assert torch.equal(weights.network.state_dict()[key], value)
+
+
+@pytest.mark.parametrize(("name", "right"), [("ggcnn", "ggcnn2"), ("ggcnn2", "ggcnn")])
+def test_published_state_dicts_under_the_wrong_name_are_told_the_right_one(
+    name: str, right: str, tmp_path: Path
+) -> None:
+    torch.save(build_network(right, {}).state_dict(), tmp_path / "published.pt")
+    with pytest.raises(WeightsError, match=f"weights of {right}, not of {name};.*allowed: as {right}$"):
+        load_weights(name, tmp_path / "published.pt")
+
+
+@pytest.mark.parametrize("name", ["dhrnet", "tfgrasp", "unet"])
+def test_other_networks_read_no_pickles(name: str, tmp_path: Path) -> None:
+    torch.save(build_network("ggcnn", {}).state_dict(), tmp_path / "published.pt")
+    with pytest.raises(WeightsError, match=f"{name} reads safetensors only"):
+        load_weights(name, tmp_path / "published.pt")
+
+
+@pytest.mark.parametrize("name", ["dhrnet", "ggcnn2"])
+def test_shipped_weights_say_what_they_are(name: str) -> None:
+    weights = load_weights(name)
+    assert weights.name == name
+    assert weights.card["licence"] == "Apache-2.0"
+    assert weights.width_px == width_unit(weights.input.size)
+
+
+@pytest.mark.parametrize(("size", "unit"), [(224, 112.0), (300, 150.0)])
+def test_a_width_of_one_is_half_the_image(size: int, unit: float) -> None:
+    assert width_unit(size) == unit
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -89,7 +122,7 @@ def test_foreign_safetensors_are_refused(tmp_path: Path) -> None:
 
 
 def test_another_network_s_weights_are_refused(tmp_path: Path) -> None:
-    save_weights(tmp_path / "w.safetensors", small("ggcnn"))
+    save_weights(tmp_path / "w.safetensors", small("ggcnn2"))
     with pytest.raises(WeightsError, match="another network"):
         load_weights("dhrnet", tmp_path / "w.safetensors")
 
@@ -104,11 +137,44 @@ def test_a_state_dict_of_another_shape_names_the_first_entry_that_differs(tmp_pa
 
 def test_channels_that_the_input_does_not_give_are_refused(tmp_path: Path) -> None:
     weights = NetworkWeights(
-        name="dhrnet", network=small().network, settings=SETTINGS, input=NetworkInput(range_channel=False)
+        name="dhrnet", network=small().network, settings=SETTINGS, input=NetworkInput(modality="rgbd")
     )
     save_weights(tmp_path / "w.safetensors", weights)
     with pytest.raises(WeightsError, match="channels"):
         load_weights("dhrnet", tmp_path / "w.safetensors")
+
+
+def test_images_of_a_size_that_the_network_is_not_laid_out_for_are_refused(tmp_path: Path) -> None:
+    settings = {"size": 64, "embed": 8, "window": 2}
+    weights = NetworkWeights(
+        name="tfgrasp", network=build_network("tfgrasp", settings), settings=settings, input=NetworkInput()
+    )
+    save_weights(tmp_path / "w.safetensors", weights)
+    with pytest.raises(WeightsError, match="another size; got 64; allowed: 224"):
+        load_weights("tfgrasp", tmp_path / "w.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("width_px", "0"),
+        ("width_px", "NaN"),
+        ("width_px", '"wide"'),
+        ("width_px", "null"),
+        ("settings", "[1]"),
+        ("settings", '{"channels": "three"}'),
+        ("input", '{"size": 3}'),
+        ("input", '{"smell": 1}'),
+        ("card", "{"),
+    ],
+)
+def test_a_description_that_makes_no_sense_is_a_weights_error(key: str, value: str, tmp_path: Path) -> None:
+    save_weights(tmp_path / "w.safetensors", small())
+    with safe_open(tmp_path / "w.safetensors", framework="pt") as file:
+        metadata = {**file.metadata(), key: value}
+    save_file(load_file(tmp_path / "w.safetensors"), tmp_path / "odd.safetensors", metadata=metadata)
+    with pytest.raises(WeightsError):
+        load_weights("dhrnet", tmp_path / "odd.safetensors")
 
 
 def test_weights_that_are_not_finite_are_refused(tmp_path: Path) -> None:
@@ -140,5 +206,7 @@ def test_a_place_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> No
 def test_unknown_networks_and_settings_are_config_errors() -> None:
     with pytest.raises(ConfigError, match="unknown network"):
         build_network("resnet", {})
+    with pytest.raises(ConfigError, match="unknown network"):
+        load_weights("resnet")
     with pytest.raises(ConfigError, match="unusable settings"):
         build_network("dhrnet", {"depth": 3})

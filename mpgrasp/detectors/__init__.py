@@ -1,8 +1,8 @@
 """Grasp detectors: a depth frame in, a grasp for every pixel out.
 
-`DETECTORS` names them all. "dhrnet" is the paper's network; "ggcnn" is GG-CNN2, trained here on the same data
-(the published GG-CNN and GG-CNN2 files load through `weights`); "oracle" reads the scene's true height map.
-Importing this package does not import torch; making a network detector does.
+`DETECTORS` names them all: "dhrnet" is the paper's network, "oracle" reads the scene's true height map, and
+the others are the networks that the paper compares with. Importing this package does not import torch; making
+a network detector does.
 """
 
 from __future__ import annotations
@@ -13,19 +13,24 @@ from pathlib import Path
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError
 
-__all__ = ["DETECTORS", "GraspDetector", "make_detector"]
+__all__ = ["DETECTORS", "RUNTIMES", "GraspDetector", "make_detector"]
+
+RUNTIMES = ("auto", "torch", "openvino")
+"""What can compute a network; see `mpgrasp.detectors.runtime`."""
+
+_Maker = Callable[[Path | str | None, str], GraspDetector]
 
 
-def _network(name: str) -> Callable[[Path | str | None], GraspDetector]:
-    def make(weights: Path | str | None) -> GraspDetector:
+def _network(name: str) -> _Maker:
+    def make(weights: Path | str | None, runtime: str) -> GraspDetector:
         from mpgrasp.detectors.network_detector import NetworkDetector
 
-        return NetworkDetector.load(name, weights)
+        return NetworkDetector.load(name, weights, runtime=runtime)
 
     return make
 
 
-def _oracle(weights: Path | str | None) -> GraspDetector:
+def _oracle(weights: Path | str | None, runtime: str) -> GraspDetector:
     from mpgrasp.detectors.oracle import OracleDetector
 
     if weights is not None:
@@ -33,20 +38,21 @@ def _oracle(weights: Path | str | None) -> GraspDetector:
     return OracleDetector()
 
 
-DETECTORS: dict[str, Callable[[Path | str | None], GraspDetector]] = {
-    "dhrnet": _network("dhrnet"),
-    "ggcnn": _network("ggcnn"),
+DETECTORS: dict[str, _Maker] = {
+    **{n: _network(n) for n in ("dhrnet", "tfgrasp", "ggcnn2", "ggcnn", "fcn", "fcn_residual", "unet")},
     "oracle": _oracle,
 }
 
 
-def make_detector(name: str, weights: Path | str | None = None) -> GraspDetector:
-    """The detector of that name; `weights` replaces the shipped file.
+def make_detector(name: str, weights: Path | str | None = None, runtime: str = "auto") -> GraspDetector:
+    """The detector of that name; `weights` replaces the shipped file, `runtime` says what computes a network.
 
     Raises:
-        ConfigError: there is no such detector, or it takes no weights.
+        ConfigError: there is no such detector or runtime, or it takes no weights.
         WeightsError: the weights are missing, unreadable or made for another network.
     """
     if name not in DETECTORS:
         raise ConfigError("unknown detector", got=name, allowed=DETECTORS)
-    return DETECTORS[name](weights)
+    if runtime not in RUNTIMES:
+        raise ConfigError("unknown runtime", got=runtime, allowed=RUNTIMES)
+    return DETECTORS[name](weights, runtime)

@@ -1,4 +1,4 @@
-"""`python -m mpgrasp.detectors show|card`: what detectors see, and what is known about their weights.
+"""`python -m mpgrasp.detectors show|check|card`: what detectors see, how exact they are, what made them.
 
 What is done with the options is in `mpgrasp.show`: this package knows nothing of the world.
 """
@@ -9,16 +9,19 @@ import argparse
 from pathlib import Path
 from typing import NoReturn
 
+from mpgrasp.detectors import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 
+_RUNTIMES = "|".join(RUNTIMES)
 _EPILOG = """\
 examples:
   python -m mpgrasp.detectors show dhrnet --suite thin --seed 3 --height 0.5 --out thin.png
-  python -m mpgrasp.detectors show ggcnn,dhrnet,oracle --suite unseen --above-object --height 0.2
+  python -m mpgrasp.detectors show ggcnn2,dhrnet,oracle --suite unseen --above-object --height 0.2
   python -m mpgrasp.detectors show my_net:MyDetector --weights my_net.pt
+  python -m mpgrasp.detectors check dhrnet --runtime openvino --frames 100
   python -m mpgrasp.detectors card dhrnet --weights out/dhrnet.safetensors
 
-exit code: 0 done, 2 unusable input, 130 interrupted (Ctrl-C).
+exit code: 0 done, 1 the runtime finds other grasps (check), 2 unusable input, 130 interrupted (Ctrl-C).
 """
 
 
@@ -26,12 +29,12 @@ def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
     parser = _Parser(
         prog="python -m mpgrasp.detectors",
-        description="See what grasp detectors see, and what is known about their weights.",
+        description="See what grasp detectors see, how exact they are, and what is known of their weights.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="show|card")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="show|check|card")
     show = commands.add_parser(
         "show", help="draw their maps and best grasps side by side", allow_abbrev=False
     )
@@ -52,6 +55,18 @@ def make_parser() -> argparse.ArgumentParser:
     add("--weights", metavar="[D=]FILE", action="append", default=[], help="in place of the shipped ones")
     add("--camera", metavar="auto|gl|ray", default="auto", help="depth camera's backend (default: auto)")
     add("--no-noise", action="store_true", help="a perfect depth camera")
+    add("--runtime", metavar=_RUNTIMES, default="auto", help="what computes networks (default: auto)")
+    check = commands.add_parser(
+        "check", help="compare a network's grasps in a runtime with those in plain torch", allow_abbrev=False
+    )
+    add = check.add_argument
+    add("detector", metavar="NAME", help="a network's name")
+    add("--runtime", metavar=_RUNTIMES, default="auto", help="what computes it (default: auto)")
+    add("--suite", default="thin", help="whose scenes are looked at (default: thin)")
+    add("--frames", metavar="N", type=int, default=100, help="number of images (default: 100)")
+    add("--seed", metavar="S", type=int, default=0, help="of the scenes and views (default: 0)")
+    add("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")
+    add("--camera", metavar="auto|gl|ray", default="auto", help="depth camera's backend (default: auto)")
     about = commands.add_parser("card", help="print the training card of weights", allow_abbrev=False)
     about.add_argument("detector", metavar="NAME", help="whose weights they are")
     about.add_argument("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")

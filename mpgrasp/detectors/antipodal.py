@@ -23,7 +23,7 @@ from mpgrasp.detectors.turned_view import TurnedView, odd
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.height_map import HeightMap
 
-__all__ = ["HandGeometry", "WorldGrasps", "antipodal_grasps"]
+__all__ = ["HandGeometry", "WorldGrasps", "antipodal_grasps", "quality_along"]
 
 Float32 = NDArray[np.float32]
 
@@ -60,18 +60,9 @@ def antipodal_grasps(
     hand = hand or HandGeometry()
     quality, angle, width = (np.zeros(height_map.height.shape, np.float32) for _ in range(3))
     grasps = WorldGrasps(quality=quality, angle=angle, width=width, height_map=height_map)
-    rows, cols = np.nonzero(height_map.label)
-    if not len(rows):
+    if not height_map.label.any():
         return grasps
-    # only the cells around objects matter: a finger and its margin beyond them
-    pad = int(np.ceil(0.04 / height_map.cell))
-    window = (
-        slice(max(rows.min() - pad, 0), rows.max() + pad + 1),
-        slice(max(cols.min() - pad, 0), cols.max() + pad + 1),
-    )
-    height, label = (np.asarray(a[window], np.float32) for a in (height_map.height, height_map.label))
-    above = (height - height_map.support[window]).astype(np.float32)
-    masses = _centres_of_mass(above, label)
+    window, height, label, masses = _around_objects(height_map)
     angles = -np.pi / 2 + np.pi * np.arange(n_angles) / n_angles
     stack = np.stack([_at_angle(height, label, masses, theta, height_map.cell, hand) for theta in angles])
     q, opening, turn = np.moveaxis(stack, -1, 0)  # each (n_angles, h, w)
@@ -86,6 +77,32 @@ def antipodal_grasps(
     angle[window] = np.where(found, wrap_half_pi(angles[best[0]] + np.clip(turn, -half_bin, half_bin)), 0)
     width[window] = np.where(found, opening, 0)
     return grasps
+
+
+def quality_along(height_map: HeightMap, angle: float, hand: HandGeometry | None = None) -> Float32:
+    """(ny, nx) worth of grasps that close along `angle` [rad] as it stands, be it the best there or not."""
+    quality = np.zeros(height_map.height.shape, np.float32)
+    if height_map.label.any():
+        window, height, label, masses = _around_objects(height_map)
+        found = _at_angle(height, label, masses, angle, height_map.cell, hand or HandGeometry())
+        quality[window] = found[..., 0]
+    return quality
+
+
+def _around_objects(
+    height_map: HeightMap,
+) -> tuple[tuple[slice, slice], Float32, Float32, FloatArray]:
+    """The window of the map that matters, its height and label, and the objects' centres of mass there."""
+    rows, cols = np.nonzero(height_map.label)
+    # a finger and its margin beyond the objects
+    pad = int(np.ceil(0.04 / height_map.cell))
+    window = (
+        slice(max(rows.min() - pad, 0), rows.max() + pad + 1),
+        slice(max(cols.min() - pad, 0), cols.max() + pad + 1),
+    )
+    height, label = (np.asarray(a[window], np.float32) for a in (height_map.height, height_map.label))
+    above = (height - height_map.support[window]).astype(np.float32)
+    return window, height, label, _centres_of_mass(above, label)
 
 
 def _centres_of_mass(above: Float32, label: Float32) -> FloatArray:
@@ -123,7 +140,9 @@ def _at_angle(
     )
     result = np.zeros((*turned.shape[:2], 3), np.float32)
     for level in view.levels():
-        view.add_grasps(level, result)
+        part, window = view.around(level)
+        if part is not None:
+            part.add_grasps(level, result[window])
     q = np.minimum(result[..., :1], 1)
     along = odd(SLIDE / cell)
     # cells are coarse: the worth over a few places, and weighted by it the fitted angle and the opening

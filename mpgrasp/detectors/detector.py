@@ -29,3 +29,19 @@ def reads_truth(detector: GraspDetector) -> bool:
     The benchmark writes it into run.json: such a detector is a ceiling, not a competitor.
     """
     return bool(getattr(detector, "reads_truth", False))
+
+
+def reads_colour(detector: GraspDetector) -> bool:
+    """Whether the detector declares, by `reads_colour = True`, that its frames must have colour."""
+    return bool(getattr(detector, "reads_colour", False))
+
+
+def prepare(detector: GraspDetector) -> str | None:
+    """Have a detector that compiles something do it now; what it took, as a line for people, if it does.
+
+    Such a detector offers `warm_up()`, which returns seconds, and `readiness`, the line.
+    """
+    if not hasattr(detector, "warm_up"):
+        return None
+    detector.warm_up()
+    return str(getattr(detector, "readiness", "")) or None

@@ -11,31 +11,20 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from mpgrasp.detectors.networks import HEADS
 from mpgrasp.exceptions import ConfigError
-
-HEADS = ("pos", "cos", "sin", "width")
 
 
 @dataclass(frozen=True, kw_only=True)
 class GGCNNConfig:
-    """Which of the two, and for what input."""
+    """Settings of either; their sizes are as published."""
 
-    variant: int = 2
-    """1: GG-CNN, for 300x300; 2: GG-CNN2, for any multiple of 4."""
     channels: int = 1
     """Input channels."""
 
     def __post_init__(self) -> None:
-        if self.variant not in (1, 2) or self.channels < 1:
-            raise ConfigError(
-                "unusable GG-CNN settings", got=self, allowed="variant 1 or 2, at least one channel"
-            )
-
-
-def make_ggcnn(config: GGCNNConfig | None = None) -> nn.Module:
-    """The network of that variant, with fresh weights."""
-    config = config or GGCNNConfig()
-    return (GGCNN if config.variant == 1 else GGCNN2)(config)
+        if self.channels < 1:
+            raise ConfigError("unusable GG-CNN settings", got=self, allowed="at least one channel")
 
 
 class _GGCNN(nn.Module):
@@ -56,9 +45,13 @@ class _GGCNN(nn.Module):
 
 
 class GGCNN(_GGCNN):
-    """(n, channels, 300, 300) -> pos, cos, sin and width, each (n, 1, 300, 300)."""
+    """(n, channels, H, W) -> pos, cos, sin and width, each (n, 1, H, W).
 
-    def __init__(self, config: GGCNNConfig) -> None:
+    H and W are multiples of 12; it was designed for 300.
+    """
+
+    def __init__(self, config: GGCNNConfig | None = None) -> None:
+        config = config or GGCNNConfig()
         super().__init__(config, features=32, kernel=2)
         self.conv1 = nn.Conv2d(config.channels, 32, 9, stride=3, padding=3)
         self.conv2 = nn.Conv2d(32, 16, 5, stride=2, padding=2)
@@ -77,7 +70,8 @@ class GGCNN(_GGCNN):
 class GGCNN2(_GGCNN):
     """(n, channels, H, W) -> pos, cos, sin and width, each (n, 1, H, W); H and W are multiples of 4."""
 
-    def __init__(self, config: GGCNNConfig) -> None:
+    def __init__(self, config: GGCNNConfig | None = None) -> None:
+        config = config or GGCNNConfig()
         super().__init__(config, features=16, kernel=1)
         self.features = nn.Sequential(
             *_conv_relu(config.channels, 16, 11),

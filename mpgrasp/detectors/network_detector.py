@@ -1,4 +1,4 @@
-"""A network as a grasp detector: depth image -> network -> grasp map.
+"""A network as a grasp detector: depth image, and colour where the network reads it -> network -> grasp map.
 
 Post-processing follows the published code (https://github.com/dougsm/ggcnn, https://github.com/dougsm/mvp_grasp):
 the quality is smoothed with 2 px, the angle and the width with 1 px. Cosine and sine of the doubled angle are
@@ -7,26 +7,29 @@ smoothed before the angle is taken from them, because smoothed angles are wrong 
 
 from __future__ import annotations
 
-import copy
-import itertools
-from dataclasses import dataclass
+import logging
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import nn
-from torch.nn.utils import fusion
 
-from mpgrasp.depth import CROP, DepthFrame, crop_resize, inpaint
-from mpgrasp.detectors.weights import NetworkWeights, load_weights
-from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import wrap_half_pi
+from mpgrasp.depth import CROP, DepthFrame, inpaint
+from mpgrasp.detectors.runtime import Runtime, make_runtime, runtime_name
+from mpgrasp.detectors.view import empty_map, says_something, square_view
+from mpgrasp.detectors.weights import NetworkWeights, default_weights, load_weights
+from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
 
 Float32 = NDArray[np.float32]
+
+LARGEST = 1e6
+"""Outputs of a network beyond this, or not finite, are no outputs; trained ones are around 1."""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,78 +44,133 @@ class NetworkDetectorConfig:
     """Smoothing of cosine and sine [px]."""
     width_sigma: float = 1.0
     """Smoothing of the width [px]."""
-    min_seen: float = 0.05
-    """Least share of pixels with a return; with fewer the image says nothing."""
-    min_relief: float = 1e-4
-    """Least difference between depths; with less the image says nothing [m]."""
-    precision: str = "float32"
-    """"float32", or "bfloat16" where the processor computes in it."""
 
     def __post_init__(self) -> None:
-        if self.precision not in ("float32", "bfloat16"):
-            raise ConfigError("unknown precision", got=self.precision, allowed=("float32", "bfloat16"))
         if self.crop < 1 or min(self.quality_sigma, self.angle_sigma, self.width_sigma) < 0:
             raise ConfigError("unusable detector settings", got=self, allowed="crop from 1, sigmas from 0")
 
 
 class NetworkDetector:
-    """A grasp network behind the `GraspDetector` protocol. It keeps nothing from one frame to the next."""
+    """A grasp network behind the `GraspDetector` protocol. It keeps nothing from one frame to the next.
 
-    def __init__(self, weights: NetworkWeights, config: NetworkDetectorConfig | None = None) -> None:
+    Args:
+        weights: the network.
+        config: what happens around it.
+        runtime: what computes it: "auto", "torch" or "openvino", or something that is ready to.
+
+    Raises:
+        ConfigError: unknown runtime, or OpenVINO where there is none.
+    """
+
+    def __init__(
+        self,
+        weights: NetworkWeights,
+        config: NetworkDetectorConfig | None = None,
+        runtime: str | Runtime = "auto",
+    ) -> None:
         self.name = weights.name
         self.weights = weights
         self.config = config or NetworkDetectorConfig()
-        self.device = "cuda" if torch.cuda.is_available() else "cpu"
-        network = _fold_batch_norms(copy.deepcopy(weights.network).eval())
-        # convolutions on the CPU are a third faster with channels last
-        self._network = network.to(device=self.device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.reads_colour = weights.input.reads_colour
+        self._asked = runtime
+        self._runtime: Runtime | None = None
+        self._name = runtime_name(runtime) if isinstance(runtime, str) else runtime.name
+        self._seconds = 0.0
 
     @classmethod
     def load(
-        cls, name: str, weights: Path | str | None = None, config: NetworkDetectorConfig | None = None
+        cls,
+        name: str,
+        weights: Path | str | None = None,
+        config: NetworkDetectorConfig | None = None,
+        runtime: str | Runtime = "auto",
     ) -> NetworkDetector:
         """The detector of that name with weights from a file, by default the shipped ones.
 
         Raises:
+            ConfigError: unknown runtime, or OpenVINO where there is none.
             WeightsError: the file is missing, unreadable or made for another network.
         """
-        return cls(load_weights(name, weights), config)
+        if weights is None and not default_weights(name).is_file():
+            raise WeightsError(
+                f"no weights are shipped for {name}",
+                allowed=f"--weights FILE; python -m mpgrasp.training train {name} makes one",
+            )
+        return cls(load_weights(name, weights), config, runtime)
+
+    @property
+    def runtime(self) -> str:
+        """What computes the network, in two or three words: "openvino bf16", "torch f32, cuda"."""
+        return self._name if self._runtime is None else self._runtime.name
+
+    @property
+    def device(self) -> str:
+        """Where the network is computed: "cpu" or "cuda"."""
+        return "cuda" if "cuda" in self.runtime else "cpu"
+
+    @property
+    def readiness(self) -> str:
+        """What is ready, and in what time it was: "dhrnet: openvino bf16, ready in 1.3 s (cached)"."""
+        if self._runtime is None:
+            return f"{self.name}: {self.runtime}, not ready yet"
+        cached = " (cached)" if self._runtime.cached else ""
+        return f"{self.name}: {self.runtime}, ready in {self._seconds:.1f} s{cached}"
+
+    def warm_up(self) -> float:
+        """Compile the network, or read it from the cache, and run it once; the first frame would, otherwise.
+
+        Returns:
+            The time that took, or had taken where it was done before [s].
+        """
+        if self._runtime is None:
+            clock = time.perf_counter()
+            ready = make_runtime(self.weights, self._asked) if isinstance(self._asked, str) else self._asked
+            image = self.weights.input
+            ready(np.zeros((image.channels, image.size, image.size), np.float32))
+            self._runtime, self._seconds = ready, time.perf_counter() - clock
+            _log.info(self.readiness)
+        return self._seconds
 
     def reset(self, truth: HeightMap | None) -> None:
         """Start an episode; a network knows nothing but images."""
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame's central square; all quality is zero where the image says nothing."""
-        crop = min(self.config.crop, *frame.depth.shape)
-        image = crop_resize(frame, crop, self.weights.input.size)
-        depth = inpaint(image.depth)
-        seen = np.isfinite(image.depth).mean() >= self.config.min_seen
-        if not seen or np.ptp(depth) < self.config.min_relief:
-            quality, angle, width = (np.zeros(depth.shape, np.float32) for _ in range(3))
-        else:
-            quality, angle, width = self.grasp_arrays(depth)
-        return GraspMap(
-            quality=quality,
-            angle=angle,
-            width=width,
-            depth=depth,
-            intrinsics=image.intrinsics,
-            T_world_camera=image.T_world_camera,
-            time=image.time,
-        )
+        """Grasp map of the frame's central square; quality is zero where image or network say nothing.
 
-    def grasp_arrays(self, depth: Float32) -> tuple[Float32, Float32, Float32]:
-        """Quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN."""
-        return postprocess(self._heads(self.weights.input(depth)), self.weights.width_px, self.config)
+        Raises:
+            ConfigError: a network that reads colour got a frame without it.
+        """
+        if self.reads_colour and frame.rgb is None:
+            raise ConfigError(
+                f"{self.name} with {self.weights.input.modality} input reads colour, and the frame has none",
+                allowed="frames with rgb, as from WristCamera(colour=True), which needs OpenGL",
+            )
+        image = square_view(frame, self.config.crop, self.weights.input.size)
+        seen = says_something(frame, image)
+        image = replace(image, depth=inpaint(image.depth))
+        if not seen:
+            return empty_map(image)
+        quality, angle, width = self.grasp_arrays(image.depth, image.rgb)
+        return replace(empty_map(image), quality=quality, angle=angle, width=width)
+
+    def grasp_arrays(
+        self, depth: Float32, rgb: NDArray[np.uint8] | None = None
+    ) -> tuple[Float32, Float32, Float32]:
+        """Quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN.
+
+        All are zero where the network's output is not finite: broken weights must not choose a grasp.
+        """
+        heads = self._heads(self.weights.input(depth, rgb))
+        if not bool((np.abs(heads) < LARGEST).all()):
+            _log.warning("%s: an output that is not finite; the frame has no grasp", self.name)
+            heads = np.zeros_like(heads)
+        return postprocess(heads, self.weights.width_px, self.config)
 
     def _heads(self, image: Float32) -> Float32:
         """Raw heads (4, size, size) for an input (channels, size, size)."""
-        x = torch.from_numpy(image)[None].to(self.device)
-        x = x.contiguous(memory_format=torch.channels_last)
-        low = self.config.precision == "bfloat16"
-        with torch.inference_mode(), torch.autocast(self.device, torch.bfloat16, enabled=low):
-            heads = self._network(x)
-        return torch.cat(heads, dim=1)[0].float().cpu().numpy()
+        self.warm_up()
+        assert self._runtime is not None
+        return self._runtime(image)
 
 
 def postprocess(
@@ -124,7 +182,9 @@ def postprocess(
     quality = np.clip(_smooth(pos, c.quality_sigma), 0.0, 1.0)
     doubled = np.arctan2(_smooth(sin, c.angle_sigma), _smooth(cos, c.angle_sigma))
     opening = np.maximum(_smooth(width, c.width_sigma) * np.float32(width_px), 0.0)
-    return quality, wrap_half_pi(doubled / 2).astype(np.float32), opening
+    angle = np.asarray(doubled / 2, np.float32)
+    angle[angle >= np.pi / 2] -= np.float32(np.pi)  # half open, as `wrap_half_pi` has it
+    return quality, angle, opening
 
 
 def _smooth(image: Float32, sigma: float) -> Float32:
@@ -135,16 +195,3 @@ def _smooth(image: Float32, sigma: float) -> Float32:
         np.ascontiguousarray(image), (size, size), sigma, borderType=cv2.BORDER_REPLICATE
     )
     return np.asarray(blurred, np.float32)
-
-
-def _fold_batch_norms(network: nn.Module) -> nn.Module:
-    """Convolution and batch norm that follow each other become one convolution: same function, less time."""
-    for name, child in network.named_children():
-        if isinstance(child, nn.Sequential):
-            layers = list(child)
-            for k, (first, second) in enumerate(itertools.pairwise(layers)):
-                if isinstance(first, nn.Conv2d) and isinstance(second, nn.BatchNorm2d):
-                    layers[k], layers[k + 1] = fusion.fuse_conv_bn_eval(first, second), nn.Identity()
-            setattr(network, name, nn.Sequential(*layers))
-        _fold_batch_norms(getattr(network, name))
-    return network

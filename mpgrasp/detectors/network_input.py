@@ -1,14 +1,15 @@
-"""From a depth image without holes to what a network reads: the same in training and in the loop.
+"""From an image without holes to what a network reads: the same in training and in the loop.
 
-The published GG-CNN code feeds depth minus its mean, in metres, clipped to +-1. A stick 4 mm high is then a
-step of 0.004, below what a freshly initialised network reacts to: the residual can be scaled up. On a
-crowded table the mean is no longer the table: the median can be taken instead. And the residual hides how
-far away the scene is, and with that how many pixels the gripper can open: a second channel can tell.
+The paper feeds depth (D), colour (RGB) or both (RGB-D). The published GG-CNN code feeds depth minus its mean,
+in metres, clipped to +-1. A stick 4 mm high is then a step of 0.004, below what a freshly initialised
+network reacts to: the residual can be scaled up. On a crowded table the mean is no longer the table: the
+median can be taken instead. Colour is fed as in the published GR-ConvNet code: as a share of full
+brightness, minus the image's mean.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,43 +17,74 @@ from numpy.typing import NDArray
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.exceptions import ConfigError
 
-RANGE_CENTRE, RANGE_SPREAD = 0.45, 0.15
-"""The middle of the distances that the wrist camera sees the table at, and their spread [m]."""
+CHANNELS = {"d": 1, "rgb": 3, "rgbd": 4}
+"""Input channels by modality."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkInput:
-    """How depth is presented to a network. The defaults are the published GG-CNN's."""
+    """How images are presented to a network. The defaults are the published GG-CNN's."""
 
     size: int = NETWORK_SIZE
     """Side of the input image [px]."""
+    modality: str = "d"
+    """"d": depth, "rgb": colour, "rgbd": depth, then colour."""
     centre: str = "mean"
-    """What is subtracted: "mean" or "median" of the image."""
+    """What is subtracted from depth: "mean" or "median" of the image."""
     clip: float = 1.0
     """Bound on the residual before it is scaled [m]."""
     scale: float = 1.0
     """Input units per metre."""
-    range_channel: bool = False
-    """Whether a second channel, the same everywhere, carries the distance of that centre."""
+    range_channel: InitVar[bool] = False
+    """Weight files from before colour say false here; nothing else can be read."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, range_channel: bool) -> None:
+        if self.modality not in CHANNELS:
+            raise ConfigError("unknown modality of an input", got=self.modality, allowed=tuple(CHANNELS))
         if self.centre not in ("mean", "median"):
             raise ConfigError("unknown centre of a depth image", got=self.centre, allowed=("mean", "median"))
         if self.size < 32 or min(self.clip, self.scale) <= 0:
             raise ConfigError(
                 "unusable network input", got=self, allowed="size from 32, clip and scale above 0"
             )
+        if range_channel:
+            raise ConfigError("an input with a range channel", got=range_channel, allowed="d, rgb, rgbd")
 
     @property
     def channels(self) -> int:
         """Channels of the input."""
-        return 2 if self.range_channel else 1
+        return CHANNELS[self.modality]
 
-    def __call__(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Input (channels, H, W) for a depth image (H, W) [m] without NaN."""
-        middle = float(np.median(depth[::2, ::2]) if self.centre == "median" else depth.mean())
-        residual = np.clip(depth - middle, -self.clip, self.clip) * np.float32(self.scale)
-        if not self.range_channel:
-            return residual[None].astype(np.float32)
-        distance = np.full_like(residual, (middle - RANGE_CENTRE) / RANGE_SPREAD)
-        return np.stack([residual, distance]).astype(np.float32)
+    @property
+    def reads_depth(self) -> bool:
+        """Whether depth is part of the input."""
+        return self.modality != "rgb"
+
+    @property
+    def reads_colour(self) -> bool:
+        """Whether colour is part of the input."""
+        return self.modality != "d"
+
+    def __call__(
+        self, depth: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
+    ) -> NDArray[np.float32]:
+        """Input (channels, H, W) for a depth image (H, W) [m] without NaN, and colour (H, W, 3).
+
+        Raises:
+            ConfigError: the modality has colour and there is none, or one of another size.
+        """
+        planes: list[NDArray[np.float32]] = []
+        if self.reads_depth:
+            middle = float(np.median(depth[::2, ::2]) if self.centre == "median" else depth.mean())
+            residual = np.clip(depth - np.float32(middle), -self.clip, self.clip) * np.float32(self.scale)
+            planes.append(residual[None].astype(np.float32, copy=False))
+        if self.reads_colour:
+            if rgb is None or rgb.shape != (*depth.shape, 3):
+                raise ConfigError(
+                    f"input {self.modality} without a colour image that fits",
+                    got=None if rgb is None else rgb.shape,
+                    allowed=f"(H, W, 3) = {(*depth.shape, 3)}",
+                )
+            colour = np.moveaxis(rgb, -1, 0).astype(np.float32) / np.float32(255)
+            planes.append(colour - colour.mean(axis=(1, 2), keepdims=True))
+        return np.concatenate(planes)

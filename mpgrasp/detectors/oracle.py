@@ -6,10 +6,13 @@ same frames as the networks, noise included, but only to know where its pixels l
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from mpgrasp.depth import DepthFrame, crop_resize, inpaint
+from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.antipodal import HandGeometry, WorldGrasps, antipodal_grasps
+from mpgrasp.detectors.view import empty_map, says_something, square_view
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, world_to_image_angle
@@ -50,7 +53,9 @@ class OracleDetector:
         """
         if self._grasps is None:
             raise ConfigError("the oracle has no scene", allowed="reset(truth) before predict")
-        image = crop_resize(frame)
+        image = square_view(frame)
+        if not says_something(frame, image):
+            return empty_map(replace(image, depth=inpaint(image.depth)))
         return view_grasps(self._grasps, image, known=np.isfinite(image.depth), depth=inpaint(image.depth))
 
 

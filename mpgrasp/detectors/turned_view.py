@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import cv2
@@ -27,6 +28,8 @@ SLANT = np.deg2rad(5.0)
 """Misalignment that the fit of the edges makes good afterwards [rad]."""
 FULL_CONTACT = 0.012
 """Contact of that length across the closing direction is as good as any longer one [m]."""
+NEIGHBOURHOOD = 0.05
+"""No finger, with its margin, reaches farther beside what it grasps [m]."""
 LANDING = 0.6
 """Worth of a grasp whose tips stop on something other than the support."""
 
@@ -58,12 +61,33 @@ class TurnedView:
             padded = np.pad(under, ((shift, shift), (0, 0)))
             # the hand may come in either way round
             self.under_camera = np.maximum(padded[: len(under)], padded[2 * shift :])
-        self.columns = np.arange(label.shape[1], dtype=np.int32)
-        self.rows = (np.arange(label.shape[0], dtype=np.float32) - label.shape[0] / 2)[:, None]
+        self._count_cells()
+
+    def _count_cells(self) -> None:
+        n_rows, n_columns = self.label.shape
+        self.columns = np.arange(n_columns, dtype=np.int32)
+        self.rows = (np.arange(n_rows, dtype=np.float32) - n_rows / 2)[:, None]
 
     def levels(self) -> list[float]:
         """Tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
         return [0.0, *np.arange(LEVEL_STEP, self.top - 0.004, LEVEL_STEP)] if self.top > 0.014 else [0.0]
+
+    def around(self, level: float) -> tuple[TurnedView | None, tuple[slice, slice]]:
+        """This view cut down to what matters at a tip height, and where that lies; None = nothing there."""
+        occupied = (self.label > 0) & (self.height > level) if level > 0 else self.label > 0
+        rows, cols = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))
+        if not len(rows):
+            return None, np.s_[0:0, 0:0]
+        pad = int(np.ceil(NEIGHBOURHOOD / self.cell))
+        top, left = max(rows[0] - pad, 0), max(cols[0] - pad, 0)
+        window = np.s_[top : rows[-1] + pad + 1, left : cols[-1] + pad + 1]
+        part = copy.copy(self)
+        for name in ("height", "label", "under_finger", "under_palm", "under_camera"):
+            whole = getattr(self, name)
+            setattr(part, name, None if whole is None else np.ascontiguousarray(whole[window]))
+        part.masses = self.masses - (left, top)
+        part._count_cells()
+        return part, window
 
     def add_grasps(self, level: float, result: Float32) -> None:
         """Write the grasps at one tip height into `result` (h, w, 3) where they are better."""

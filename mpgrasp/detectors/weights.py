@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -14,17 +15,39 @@ from safetensors.torch import save_file
 from torch import nn
 
 from mpgrasp import paths
-from mpgrasp.detectors.dhrnet import DHRNet, DHRNetConfig
-from mpgrasp.detectors.ggcnn import GGCNNConfig, make_ggcnn
+from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.network_input import NetworkInput
+from mpgrasp.detectors.networks import INPUT_SIZE, NETWORKS, build_network
 from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 
+__all__ = [
+    "NETWORKS",
+    "WIDTH_PX",
+    "NetworkWeights",
+    "build_network",
+    "default_weights",
+    "load_weights",
+    "read_card",
+    "save_weights",
+    "width_unit",
+]
+
 FORMAT = "mpgrasp-weights-1"
-NETWORKS = ("dhrnet", "ggcnn")
 PUBLISHED_WIDTH_PX = 150.0
-"""What a width output of 1 means in the published GG-CNN files, in pixels of the network's own image."""
-WIDTH_PX = 112.0
-"""The same for networks trained here: 150 px in a 300 px image of the same crop, in 224 px [px]."""
+"""What a width output of 1 means in the published GG-CNN files, in pixels of the network's own image [px]."""
+WIDTH_SHARE = 0.5
+"""The same for networks trained here, as a share of their image's side: 150 px of 300."""
+PUBLISHED = {"ggcnn": "conv1.weight", "ggcnn2": "features.0.weight"}
+"""Networks whose published state dicts can be read, and an entry that tells them apart."""
+
+
+def width_unit(size: int) -> float:
+    """What a width output of 1 means [px] for a network trained here on images of that side [px]."""
+    return WIDTH_SHARE * size
+
+
+WIDTH_PX = width_unit(NETWORK_SIZE)
+"""The same for images of `depth.NETWORK_SIZE` [px]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,25 +61,9 @@ class NetworkWeights:
     """Keyword arguments of the network's config."""
     input: NetworkInput = field(default_factory=NetworkInput)
     width_px: float = WIDTH_PX
-    """What a width output of 1 means [px]."""
+    """What a width output of 1 means, in pixels of the network's image [px]; `width_unit` of its side."""
     card: Mapping[str, Any] = field(default_factory=dict)
     """Training card: data, seed, steps, time, metrics, licence."""
-
-
-def build_network(name: str, settings: Mapping[str, Any]) -> nn.Module:
-    """A network with fresh weights.
-
-    Raises:
-        ConfigError: unknown name or settings.
-    """
-    try:
-        if name == "dhrnet":
-            return DHRNet(DHRNetConfig(**settings))
-        if name == "ggcnn":
-            return make_ggcnn(GGCNNConfig(**settings))
-    except TypeError as error:
-        raise ConfigError(f"unusable settings of {name}: {error}", got=dict(settings)) from error
-    raise ConfigError("unknown network", got=name, allowed=NETWORKS)
 
 
 def save_weights(
@@ -95,8 +102,11 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
     """Read the weights of network `name`, by default the shipped ones, on the CPU and in evaluation mode.
 
     Raises:
+        ConfigError: there is no such network.
         WeightsError: the file is missing, unreadable or made for another network.
     """
+    if name not in NETWORKS:
+        raise ConfigError("unknown network", got=name, allowed=NETWORKS)
     file = Path(path) if path is not None else default_weights(name)
     if not file.is_file():
         raise WeightsError("no such weights file", got=str(file), allowed="a .safetensors, .pt or .pth file")
@@ -136,12 +146,19 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
             state = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
         network = build_network(name, about["settings"])
         image = NetworkInput(**about["input"])
-    except (OSError, SafetensorError, ConfigError, TypeError) as error:
+        width_px = float(about["width_px"])
+    except (OSError, SafetensorError, ValueError, TypeError) as error:  # a ConfigError is a ValueError
         raise WeightsError(f"weights cannot be used: {error}", got=str(path)) from error
+    if not (math.isfinite(width_px) and width_px > 0):
+        raise WeightsError("weights with a wrong unit of width", got=width_px, allowed="above 0 px")
     channels = about["settings"].get("channels", 1)
     if channels != image.channels:
         raise WeightsError(
             "weights with a wrong number of channels", got=channels, allowed=str(image.channels)
+        )
+    if getattr(network.config, "size", image.size) != image.size:
+        raise WeightsError(
+            "weights for images of another size", got=network.config.size, allowed=str(image.size)
         )
     _load_state(network, state, path)
     return NetworkWeights(
@@ -149,13 +166,13 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
         network=network,
         settings=about["settings"],
         input=image,
-        width_px=float(about["width_px"]),
+        width_px=width_px,
         card=about["card"],
     )
 
 
 def _read_published(name: str, path: Path) -> NetworkWeights:
-    if name != "ggcnn":
+    if name not in PUBLISHED:
         raise WeightsError(f"{name} reads safetensors only", got=str(path), allowed="a .safetensors file")
     try:
         # weights_only: a pickle from elsewhere must not run code
@@ -166,15 +183,16 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
         ) from error
     if not isinstance(state, dict) or not all(isinstance(v, torch.Tensor) for v in state.values()):
         raise WeightsError("not a state dict", got=str(path), allowed="a published GG-CNN state dict")
-    variant = 1 if "conv1.weight" in state else 2
-    settings = {"variant": variant}
-    network = build_network(name, settings)
+    for other, entry in PUBLISHED.items():
+        if other != name and entry in state and PUBLISHED[name] not in state:
+            raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
+    network = build_network(name, {})
     _load_state(network, state, path)
     return NetworkWeights(
         name=name,
         network=network,
-        settings=settings,
-        input=NetworkInput(size=300) if variant == 1 else NetworkInput(),
+        settings={},
+        input=NetworkInput(size=INPUT_SIZE.get(name, NETWORK_SIZE)),
         width_px=PUBLISHED_WIDTH_PX,
         card={"data": "Cornell", "source": "https://github.com/dougsm/ggcnn", "licence": "BSD-3-Clause"},
     )
