@@ -10,11 +10,28 @@ import numpy as np
 import pytest
 from height_maps import Solid, height_map
 
-from mpgrasp.exceptions import ConfigError, OutputError
-from mpgrasp.training import generate as module
-from mpgrasp.training.generate import CAMERA_HEIGHT, META_COLUMNS, GenerateConfig, camera_pose, generate
+from mpgrasp import rasteriser
+from mpgrasp.detectors.antipodal import WorldGrasps
+from mpgrasp.exceptions import CameraError, ConfigError, OutputError
+from mpgrasp.geometry import invert, transform_points
+from mpgrasp.training import shards, views
+from mpgrasp.training.__main__ import main
+from mpgrasp.training.generate import GenerateConfig, generate, make_scene, make_views
+from mpgrasp.training.verification import GOOD, TRIAL_COLUMNS, Verified
+from mpgrasp.training.views import (
+    CAMERA_HEIGHT,
+    META_COLUMNS,
+    camera_pose,
+    stored_intrinsics,
+    stored_pose,
+)
 
-CONFIG = GenerateConfig(scenes=2, seed=0, views=2, camera="ray")
+CONFIG = GenerateConfig(scenes=2, seed=0, views=2, camera="ray", colour=False)
+try:
+    rasteriser.require_gl()
+    HAS_GL = True
+except CameraError:
+    HAS_GL = False
 
 
 def digests(paths: list[Path]) -> list[str]:
@@ -24,7 +41,7 @@ def digests(paths: list[Path]) -> list[str]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "SHARD_SCENES", 1)
+        patch.setattr(shards, "SHARD_SCENES", 1)
         return generate(CONFIG, tmp_path_factory.mktemp("one"), progress=False)
 
 
@@ -36,25 +53,95 @@ def test_shards_hold_what_meta_json_says(made: list[Path]) -> None:
         with np.load(path) as arrays:
             shapes = {name: (arrays[name].dtype.name, arrays[name].shape) for name in arrays.files}
             assert arrays["meta"][:, META_COLUMNS.index("scene")].tolist() == [made.index(path)] * 2
+            n_trials = len(arrays["trials"])
         image = (2, description["size"], description["size"])
         assert shapes == {
             "depth": ("uint16", image),
             **{name: ("uint8", image) for name in ("quality", "angle", "width", "object_mask")},
             "meta": ("float32", (2, len(description["meta_columns"]))),
+            "trials": ("float32", (n_trials, len(description["trial_columns"]))),
         }
+        assert n_trials >= 2
 
 
 def test_the_number_of_workers_changes_no_byte(
     made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "SHARD_SCENES", 1)
+    monkeypatch.setattr(shards, "SHARD_SCENES", 1)
     assert digests(generate(CONFIG, tmp_path, workers=2, progress=False)) == digests(made)
+
+
+def test_the_card_counts_the_lifts_that_the_shards_record(made: list[Path]) -> None:
+    card = (made[0].parent / "README.md").read_text()
+    trials = []
+    for path in made:
+        with np.load(path) as arrays:
+            trials.append(arrays["trials"])
+    told = dict(zip(TRIAL_COLUMNS, np.concatenate(trials).T, strict=True))
+    audit = told["audit"] > 0
+    n, lifted = int(audit.sum()), int(told["lifted"][audit].sum())
+    assert f"| shipped positives ({GOOD} or better) | {lifted}/{n} = " in card
+    assert np.all(told["shipped"][audit] >= GOOD)
+    assert np.all(told["quality"][told["positive"] == 0] == 0)
+    assert "--scenes 2 --seed 0 --views 2 --out DIR --camera ray --no-colour" in card
+
+
+def test_a_stored_view_leads_back_to_the_grasps_that_were_lifted(made: list[Path]) -> None:
+    # the depth under a grasp's point, seen from the stored pose, is that point's
+    near = []
+    for path in made:
+        with np.load(path) as arrays:
+            for meta, depth in zip(arrays["meta"], arrays["depth"], strict=True):
+                points = arrays["trials"][:, [TRIAL_COLUMNS.index(c) for c in "xyz"]].astype(float)
+                camera = transform_points(invert(stored_pose(meta)), points)
+                u, v = np.rint(stored_intrinsics().project(camera)).astype(int).T
+                seen = (u >= 0) & (u < 224) & (v >= 0) & (v < 224)
+                measured = depth[v[seen], u[seen]] * 5e-5
+                near += (np.abs(measured - camera[seen, 2])[measured > 0] < 0.006).tolist()
+    assert len(near) >= 4
+    assert np.mean(near) > 0.7
+
+
+def test_a_scene_made_again_is_the_same_to_the_colour() -> None:
+    first, second = (make_scene(3, 0)[0] for _ in range(2))
+    assert np.array_equal(first.state, second.state)
+    assert np.array_equal(first.model.geom_rgba, second.model.geom_rgba)
+    assert np.array_equal(first.model.light_dir, second.model.light_dir)
+
+
+@pytest.mark.skipif(not HAS_GL, reason="no OpenGL on this machine")
+def test_colour_changes_nothing_but_adds_an_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unverified(scene: object, grasps: WorldGrasps, rng: object, *, index: int) -> Verified:
+        return Verified(grasps=grasps, trials=np.zeros((0, len(TRIAL_COLUMNS)), np.float32))
+
+    monkeypatch.setattr(views, "verify", unverified)
+    plain, coloured = (
+        make_views(GenerateConfig(scenes=1, seed=0, views=1, camera="gl", colour=colour), 0)
+        for colour in (False, True)
+    )
+    assert set(coloured) - set(plain) == {"rgb"}
+    assert coloured["rgb"].shape == (1, 224, 224, 3)
+    assert coloured["rgb"].dtype == np.uint8
+    assert all(np.array_equal(plain[name], coloured[name]) for name in plain)
+    assert coloured["rgb"].std() > 1
+
+
+def test_without_gl_colour_is_one_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(rasteriser, "_gl_error", lambda: CameraError("broken"))
+    out = tmp_path / "set"
+    assert main(["generate", "--scenes", "1", "--out", str(out)]) == 2
+    assert "--no-colour" in capsys.readouterr().err
+    assert not out.exists()
+    with pytest.raises(ConfigError, match="no colour"):
+        GenerateConfig(scenes=1, camera="ray")
 
 
 def test_finished_shards_are_kept_and_missing_ones_made_again(
     made: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "SHARD_SCENES", 1)
+    monkeypatch.setattr(shards, "SHARD_SCENES", 1)
     before, stamp = digests(made), made[0].stat().st_mtime_ns
     made[1].unlink()
     generate(CONFIG, made[0].parent, progress=False)
@@ -63,7 +150,7 @@ def test_finished_shards_are_kept_and_missing_ones_made_again(
 
 
 def test_a_directory_with_other_data_is_refused(made: list[Path]) -> None:
-    other = GenerateConfig(scenes=2, seed=5, views=2, camera="ray")
+    other = GenerateConfig(scenes=2, seed=5, views=2, camera="ray", colour=False)
     with pytest.raises(ConfigError, match="other data"):
         generate(other, made[0].parent, progress=False)
 

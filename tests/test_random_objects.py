@@ -2,15 +2,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
+from mpgrasp.object_model import ObjectModel
 from mpgrasp.objects import OBJECT_SETS, load_object
 from mpgrasp.scene import build_scene
+from mpgrasp.training.hollow_families import HOLLOW_FAMILIES
 from mpgrasp.training.random_objects import (
     LIKENESS,
     random_object,
     resembles_evaluation_object,
     training_scene_config,
 )
+from mpgrasp.training.shapes import Family
+from mpgrasp.training.solid_families import SOLID_FAMILIES
+from mpgrasp.training.thin_families import THIN_FAMILIES
 
 NAMES = [name for names in OBJECT_SETS.values() for name in names]
 
@@ -71,3 +77,43 @@ def test_about_half_of_the_scenes_hold_thin_objects_alone() -> None:
 def test_training_scenes_settle(seed: int) -> None:
     scene = build_scene(training_scene_config(np.random.default_rng(seed)), seed, robot=False)
     assert (scene.height_map().label > 0).any()
+
+
+FAMILIES = {**HOLLOW_FAMILIES, **SOLID_FAMILIES, **THIN_FAMILIES}
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__.strip("_"))
+def test_every_family_gives_sane_objects(family: Family) -> None:
+    rng = np.random.default_rng(4)
+    sizes = []
+    for _ in range(20):
+        model = ObjectModel(name="o", parts=tuple(family(rng)), mass=0.1)
+        assert 1e-7 < model.volume < 1.5e-3
+        sizes.append(model.size)
+    assert np.ptp(sizes, axis=0).max() > 0.005  # dimensions vary
+    if family in THIN_FAMILIES:
+        assert max(size[2] for size in sizes) < 0.0121
+
+
+@pytest.mark.parametrize(
+    "family",
+    [family for family in HOLLOW_FAMILIES if family.__name__ != "_wedge"],  # which is there for its slopes
+    ids=lambda family: family.__name__.strip("_"),
+)
+def test_hollow_families_are_not_convex(family: Family) -> None:
+    rng = np.random.default_rng(5)
+    model = ObjectModel(name="o", parts=tuple(family(rng)), mass=0.1)
+    assert model.volume < 0.95 * ConvexHull(model.points).volume
+
+
+def test_stacks_have_their_broadest_object_at_the_bottom_and_stand_on_one_another() -> None:
+    found = 0
+    for seed in range(60):
+        config = training_scene_config(np.random.default_rng(seed))
+        if config.placing != "pile" or config.half_extent > 0.03:
+            continue
+        areas = [o.size[0] * o.size[1] for o in config.objects]  # type: ignore[union-attr]
+        assert areas == sorted(areas, reverse=True)
+        assert 2 <= len(areas) <= 4
+        found += 1
+    assert found >= 2

@@ -8,13 +8,17 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 
+from mpgrasp.geometry import looking_down
 from mpgrasp.training.labels import encode_angle, encode_depth
 
 DIRECTIONS = (0.4, -1.1)
 """Closing directions, an odd angle and the one at right angles to it, nearly [rad]."""
-COLUMNS = ["camera_height", "scene", "thin"]
+COLUMNS = ["camera_height", "scene", "thin", "camera_x", "camera_y", "turn_x", "turn_y", "turn_z"]
+CAMERA = looking_down([0.5, 0.0, 0.4], 0.3)
+"""Pose of every image's camera."""
 
 
 def toy_image(rng: np.random.Generator, size: int = 64) -> dict[str, np.ndarray]:
@@ -30,14 +34,22 @@ def toy_image(rng: np.random.Generator, size: int = 64) -> dict[str, np.ndarray]
     depth = 0.4 + 1e-4 * (u - cu) - height * bar + rng.normal(0, 2e-4, u.shape)
     quality = np.where(bar, np.exp(-((across / breadth) ** 2) - (along / length) ** 2), 0.0)
     depth[rng.random(depth.shape) < 0.002] = np.nan
+    turn = cv2.Rodrigues(CAMERA[:3, :3])[0][:, 0]
     return {
         "depth": encode_depth(depth),
         "quality": np.rint(255 * quality).astype(np.uint8),
         "angle": encode_angle(np.where(bar, closing, 0.0)),
         "width": np.where(bar, np.rint(breadth * 1.5), 0).astype(np.uint8),
         "object_mask": bar.astype(np.uint8),
-        "meta": np.array([0.4, 0.0, float(height < 0.013)], np.float32),
+        "rgb": toy_colour(bar, rng),
+        "meta": np.array([0.4, 0.0, height < 0.013, *CAMERA[:2, 3], *turn], np.float32),
     }
+
+
+def toy_colour(bar: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A bar of a random colour on grey cloth."""
+    image = np.where(bar[..., None], rng.uniform(30, 220, 3), 120.0) + rng.normal(0, 4, (*bar.shape, 3))
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
 
 def write_shards(
@@ -46,7 +58,7 @@ def write_shards(
     """Shards of `images` images, each of its own scene."""
     rng = np.random.default_rng(seed)
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / "meta.json").write_text(json.dumps({"format": 1, "seed": seed, "meta_columns": COLUMNS}))
+    (directory / "meta.json").write_text(json.dumps({"format": 2, "seed": seed, "meta_columns": COLUMNS}))
     for k in range(shards):
         rows = [toy_image(rng, size) for _ in range(images)]
         arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}

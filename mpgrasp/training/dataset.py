@@ -1,8 +1,8 @@
 """Training shards in memory, and augmented batches from them.
 
-A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each (n, 224,
-224) in the units of labels.py, and `meta` (n, k), whose columns are the "meta_columns" of meta.json beside
-it.
+A shard is `shard_00000.npz` as `generate` writes it (format 2): `depth`, `quality`, `angle` and `width`, each
+(n, 224, 224) in the units of labels.py, `rgb` (n, 224, 224, 3), and `meta` (n, k), whose columns are the
+"meta_columns" of meta.json beside it. Colour is read only where it is asked for.
 
 Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16
 bit units: half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
@@ -26,6 +26,8 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation, Sample, augment
 from mpgrasp.training.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
 
+FORMAT = 2
+"""Of shards that can be read."""
 SCENE_COLUMN = "scene"
 """Images of one scene are either all held out or none."""
 
@@ -52,17 +54,27 @@ class GraspDataset:
     Args:
         directories: where shards lie; all must have the same columns.
         holdout: share of scenes for validation.
+        colour: read colour too.
+        images: train on the first so many images, after held-out ones are put aside; None takes all.
 
     Raises:
-        ConfigError: no shards, or shards that cannot be read.
+        ConfigError: no shards, shards that cannot be read, or colour is asked for and not there.
     """
 
-    def __init__(self, directories: Sequence[Path], *, holdout: float = 0.1) -> None:
+    def __init__(
+        self,
+        directories: Sequence[Path],
+        *,
+        holdout: float = 0.1,
+        colour: bool = False,
+        images: int | None = None,
+    ) -> None:
         if not 0 <= holdout < 1:
             raise ConfigError("unusable share of held-out scenes", got=holdout, allowed="from 0 to below 1")
         self._directories = [Path(d) for d in directories]
-        self._holdout = holdout
-        self._seen: set[Path] = set()
+        self._holdout, self._images = holdout, images
+        self.colour = colour
+        self._paths: list[Path] = []
         self._told: dict[Path, dict[str, Any]] = {}
         self._shards: list[dict[str, np.ndarray]] = []
         self.columns: list[str] = []
@@ -79,10 +91,10 @@ class GraspDataset:
 
     def refresh(self) -> int:
         """Read shards that have appeared since, and return how many; earlier images keep their numbers."""
-        found = [p for d in self._directories for p in sorted(d.glob("shard_*.npz")) if p not in self._seen]
+        found = [p for d in self._directories for p in sorted(d.glob("shard_*.npz")) if p not in self._paths]
         for path in found:
-            shard = _read_shard(path)
             self._told[path.parent] = told = _read_description(path.parent)
+            shard = _read_shard(path, colour=self.colour)
             columns = told["meta_columns"]
             if len(columns) != shard["meta"].shape[1]:
                 raise ConfigError(
@@ -91,7 +103,7 @@ class GraspDataset:
             if self._shards and columns != self.columns:
                 raise ConfigError("shards with different columns", got=columns, allowed=str(self.columns))
             self.columns = columns
-            self._seen.add(path)
+            self._paths.append(path)
             rows = np.arange(len(shard["depth"]))
             place = np.column_stack([np.full(len(rows), len(self._shards)), rows])
             self._place = np.concatenate([self._place, place])
@@ -99,7 +111,7 @@ class GraspDataset:
             self._shards.append(shard)
         if found:
             held = _held_out(self._scenes(), self._holdout)
-            self.training, self.held = np.flatnonzero(~held), np.flatnonzero(held)
+            self.training, self.held = np.flatnonzero(~held)[: self._images], np.flatnonzero(held)
         return len(found)
 
     def __len__(self) -> int:
@@ -119,15 +131,43 @@ class GraspDataset:
         return len(np.unique(self._scenes()[self.training]))
 
     def description(self) -> list[dict[str, object]]:
-        """For each directory its name, how many shards were read, and what its meta.json tells of them."""
+        """For each directory its name, how many shards were read, what its meta.json tells, and the lifts."""
         about: list[dict[str, object]] = []
         for directory, meta in self._told.items():
-            shards = sum(path.parent == directory for path in self._seen)
+            shards = sum(path.parent == directory for path in self._paths)
             making: dict[str, object] = {
                 k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta
             }
-            about.append({"name": directory.name, "shards": shards, **making})
+            about.append({"name": directory.name, "shards": shards, **making, **self._lifts(directory)})
         return about
+
+    def _lifts(self, directory: Path) -> dict[str, object]:
+        """Of the simulated lifts behind the labels: (lifted, tried) by where the grasps were drawn from."""
+        names = self._told[directory].get("trial_columns")
+        read = zip(self._paths, self._shards, strict=True)
+        trials = [s["trials"] for path, s in read if path.parent == directory and "trials" in s]
+        if not names or not trials:
+            return {}
+        told = dict(zip(names, np.concatenate(trials).T, strict=True))
+        positive, audit = told["positive"] > 0, told["audit"] > 0
+        groups = {
+            "analytic_positives": positive & ~audit,
+            "analytic_negatives": ~positive,
+            "shipped_positives": audit,
+        }
+        return {"lifts": {k: [int(told["lifted"][m].sum()), int(m.sum())] for k, m in groups.items()}}
+
+    def scene(self, index: int) -> tuple[int, int]:
+        """Seed and number of the scene that image `index` shows, as `make_scene` takes them.
+
+        Raises:
+            ConfigError: shards that do not tell.
+        """
+        scenes = self.column(SCENE_COLUMN)
+        directory = self._paths[self._place[index, 0]].parent
+        if scenes is None or "seed" not in self._told[directory]:
+            raise ConfigError("shards that do not tell their scenes", got=str(directory), allowed="a seed")
+        return int(self._told[directory]["seed"]), int(scenes[index])
 
     def sample(self, index: int) -> Sample:
         """Image `index` as it is."""
@@ -139,6 +179,7 @@ class GraspDataset:
             angle=decode_angle(arrays["angle"][row]),
             width=arrays["width"][row].astype(np.float32),
             valid=np.ones(arrays["depth"][row].shape, bool),
+            rgb=arrays["rgb"][row] if self.colour else None,
         )
 
     def batch(
@@ -152,8 +193,9 @@ class GraspDataset:
         samples = [self.sample(int(i)) for i in indices]
         if rng is not None:
             samples = [augment(s, augmentation or Augmentation(), rng) for s in samples]
+        samples = [s.resized(image.size) for s in samples]
         return Batch(
-            image=np.stack([image(s.depth) for s in samples]),
+            image=np.stack([image(s.depth, s.rgb) for s in samples]),
             quality=np.stack([s.quality for s in samples]),
             angle=np.stack([s.angle for s in samples]),
             width=np.stack([s.width for s in samples]),
@@ -171,20 +213,34 @@ def _read_description(directory: Path) -> dict[str, Any]:
     path = directory / "meta.json"
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
-        return {**told, "meta_columns": [str(name) for name in told["meta_columns"]]}
+        told = {**told, "meta_columns": [str(name) for name in told["meta_columns"]]}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"unreadable description of shards: {error!r}", got=str(path)) from error
+    if told.get("format") != FORMAT:
+        raise ConfigError(
+            f"shards of another format in {directory.name}",
+            got=told.get("format"),
+            allowed=f"{FORMAT}; generate them anew",
+        )
+    return told
 
 
-def _read_shard(path: Path) -> dict[str, np.ndarray]:
+def _read_shard(path: Path, *, colour: bool) -> dict[str, np.ndarray]:
+    keys = ["depth", "quality", "angle", "width", "meta", *(["rgb"] if colour else [])]
     try:
         with np.load(path) as file:
-            shard = {key: file[key] for key in ("depth", "quality", "angle", "width", "meta")}
+            if colour and "rgb" not in file:
+                raise ConfigError(
+                    "shard without colour", got=str(path), allowed="input d, or data with colour"
+                )
+            shard = {key: file[key] for key in (*keys, "trials") if key in keys or key in file}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise ConfigError(f"unreadable shard: {error}", got=str(path)) from error
     shape = shard["depth"].shape
     if len(shape) != 3 or any(shard[k].shape != shape for k in ("quality", "angle", "width")):
         raise ConfigError("shard with maps of different sizes", got=str(path), allowed="all (n, H, W)")
+    if colour and (shard["rgb"].shape != (*shape, 3) or shard["rgb"].dtype != np.uint8):
+        raise ConfigError("shard with unusable colour", got=str(path), allowed="uint8 (n, H, W, 3)")
     if shard["depth"].dtype != np.uint16 or len(shard["meta"]) != shape[0]:
         raise ConfigError(
             "shard of another format", got=str(path), allowed="uint16 depth, one meta row an image"

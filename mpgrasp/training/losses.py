@@ -9,11 +9,27 @@ says zero everywhere.
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from mpgrasp.training.dataset import Batch
 from mpgrasp.training.trainer_config import LossConfig
+
+PARTS = ("loss", "pos", "cos", "sin", "width")
+"""The whole and its parts, as `grasp_loss` names them."""
+
+
+def to_tensors(batch: Batch, width_px: float) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+    """Image, quality, angle, width and valid of a batch; widths in units of the head, `width_px` each."""
+    return (
+        torch.from_numpy(batch.image),
+        torch.from_numpy(batch.quality),
+        torch.from_numpy(batch.angle),
+        torch.from_numpy(batch.width / np.float32(width_px)),
+        torch.from_numpy(batch.valid),
+    )
 
 
 def grasp_loss(
@@ -36,15 +52,18 @@ def grasp_loss(
     """
     pos, cos, sin, opening = (h[:, 0] for h in heads)
     seen = valid.float()
-    positive = ((quality > 0) & valid).float()
+    positive = (quality > 0).float() * seen
     # per labelled pixel, or thin objects would hardly count beside large ones; bounded for empty batches
     count = positive.sum().clamp(min=1e-3 * quality.numel())
-    masked = positive + config.background * (seen - positive)
+    # everything but the heads is constant: one product each to differentiate
+    weight = seen * (1 + config.positive * quality) / count
+    masked = (positive + config.background * (seen - positive)) / count
+    doubled = 2 * angle
     parts = {
-        "pos": (_error(pos, quality, config) * seen * (1 + config.positive * quality)).sum() / count,
-        "cos": (_error(cos, torch.cos(2 * angle) * positive, config) * masked).sum() / count,
-        "sin": (_error(sin, torch.sin(2 * angle) * positive, config) * masked).sum() / count,
-        "width": (_error(opening, width * positive, config) * masked).sum() / count,
+        "pos": _total(pos, quality, weight, config),
+        "cos": _total(cos, torch.cos(doubled) * positive, masked, config),
+        "sin": _total(sin, torch.sin(doubled) * positive, masked, config),
+        "width": _total(opening, width * positive, masked, config),
     }
     total = (
         config.quality_weight * parts["pos"]
@@ -55,5 +74,5 @@ def grasp_loss(
     return {"loss": total, **parts}
 
 
-def _error(prediction: Tensor, target: Tensor, config: LossConfig) -> Tensor:
-    return F.smooth_l1_loss(prediction, target, reduction="none", beta=config.beta)
+def _total(prediction: Tensor, target: Tensor, weight: Tensor, config: LossConfig) -> Tensor:
+    return (F.smooth_l1_loss(prediction, target, reduction="none", beta=config.beta) * weight).sum()

@@ -44,6 +44,8 @@ class Verdict:
     """The network's quality at its best pixel."""
     label_quality: float
     """Best label quality within `NEAR` of it whose angle agrees, 0 where none does."""
+    score: float
+    """The same where the opening agrees too, as a share of the image's best label."""
 
 
 def judge(
@@ -57,11 +59,13 @@ def judge(
     agrees = line_angle_difference(truth.angle[around], theta) <= MAX_ANGLE
     ratio = opening / np.maximum(truth.width[around], 1e-6)
     fits = (ratio >= OPENING[0]) & (ratio <= OPENING[1])
+    labels = truth.quality[around] * agrees
     return Verdict(
         hit=bool((good[around] & agrees & fits).any()),
         rectangle=_rectangle_hit(row, col, theta, opening, truth, good),
         quality=float(quality[row, col]),
-        label_quality=float((truth.quality[around] * agrees).max()),
+        label_quality=float(labels.max()),
+        score=float((labels * fits).max() / max(float(truth.quality.max()), 1 / 255)),
     )
 
 
@@ -93,12 +97,16 @@ def _rectangle(row: int, col: int, theta: float, opening: float) -> GraspRectang
 
 
 def summarise(
-    verdicts: Mapping[int, Verdict], graspable: Mapping[int, bool], dataset: GraspDataset
+    verdicts: Mapping[int, Verdict],
+    graspable: Mapping[int, bool],
+    dataset: GraspDataset,
+    lifted: Mapping[int, bool] | None = None,
 ) -> dict[str, float]:
     """Rates over images with a labelled grasp, for all and by group; and what is claimed where there is none.
 
-    Keys: hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the same of
-    images without any label), n; hit_<group> and n_<group> for thin, thick, low, mid and high cameras.
+    Keys: score, hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the
+    same of images without any label), n; lift and n_lift, of the images whose best grasp was executed;
+    hit_<group> and n_<group> for thin, thick, low, mid and high cameras.
     """
     images = np.array([i for i in verdicts if graspable[i]], int)
     empty = [verdicts[i].quality for i in verdicts if not graspable[i]]
@@ -108,10 +116,13 @@ def summarise(
     if not len(images):
         return summary
     hits = np.array([verdicts[i].hit for i in images], float)
+    summary["score"] = float(np.mean([verdicts[i].score for i in images]))
     summary["hit"] = float(hits.mean())
     summary["rectangle"] = float(np.mean([verdicts[i].rectangle for i in images]))
     summary["label_quality"] = float(np.mean([verdicts[i].label_quality for i in images]))
     summary["claimed"] = float(np.mean([verdicts[i].quality for i in images]))
+    if lifted:
+        summary |= {"lift": float(np.mean(list(lifted.values()))), "n_lift": float(len(lifted))}
     for name, members in _groups(dataset).items():
         chosen = members[images]
         if chosen.any():

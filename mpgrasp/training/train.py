@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpgrasp import paths
+from mpgrasp.depth import NETWORK_SIZE
+from mpgrasp.detectors.network_input import CHANNELS, NetworkInput
+from mpgrasp.detectors.networks import INPUT_SIZE
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.training.trainer_config import TrainConfig
+from mpgrasp.training.trainer_config import TRAINABLE, TrainConfig
+
+if TYPE_CHECKING:
+    from mpgrasp.training.trainer import Trainer
+
+NOT_OPTIONS = ("name", "command", "run", "default_of")
+"""What parsed arguments hold beside this command's options."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
     defaults = TrainConfig(name="dhrnet")
     loss, image = defaults.loss, defaults.input
+    parser.set_defaults(default_of=parser.get_default)
     add = parser.add_argument
-    add("name", help="network: dhrnet or ggcnn")
+    add("name", help="network: " + ", ".join(TRAINABLE))
     add("--data", type=Path, nargs="+", required=True, metavar="DIR", help="directories of shards")
     add(
         "--validation",
@@ -27,6 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="directories to validate on (default: held out)",
     )
     add("--out", type=Path, metavar="FILE", help="weights file (default: the shipped one)")
+    add("--curves", type=Path, metavar="DIR", help="where the curves go (default: beside the weights)")
+    add(
+        "--input",
+        default=image.modality,
+        choices=tuple(CHANNELS),
+        help="depth, colour or both (default: %(default)s)",
+    )
     add("--settings", default="{}", metavar="JSON", help="of the network, such as '{\"width\": 48}'")
     add("--epochs", type=float, default=defaults.epochs, help="passes over the data (default: %(default)s)")
     add("--minutes", type=float, help="time for everything, instead of epochs")
@@ -40,12 +61,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--beta", type=float, default=loss.beta, help="bend of smooth-L1 (default: %(default)s)")
     add("--centre", default=image.centre, help="of the input's depth: mean or median (default: %(default)s)")
     add("--scale", type=float, default=image.scale, help="input units a metre (default: %(default)s)")
-    add(
-        "--range",
-        action=argparse.BooleanOptionalAction,
-        default=image.range_channel,
-        help="a second channel with the scene's distance (default: %(default)s)",
-    )
     add("--no-augmentation", action="store_true", help="images as they are")
     add(
         "--thin-weight",
@@ -53,7 +68,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=defaults.thin_weight,
         help="how much oftener thin scenes are drawn",
     )
+    add("--precision", default=defaults.precision, help="bfloat16 or float32 (default: %(default)s)")
+    add("--images", type=int, metavar="N", help="train on the first N images only")
     add("--holdout", type=float, default=defaults.holdout, help="share of scenes to validate on")
+    add(
+        "--validation-images",
+        type=int,
+        default=defaults.validation_images,
+        help="validate on so many images (default: %(default)s)",
+    )
+    add(
+        "--lift-images",
+        type=int,
+        default=defaults.lift_images,
+        help="grasp so many of them in simulation, 0 = none (default: %(default)s)",
+    )
+    add(
+        "--validate-every",
+        type=float,
+        default=defaults.validate_every,
+        help="share of the budget between validations (default: %(default)s)",
+    )
     add("--seed", type=int, default=defaults.seed, help="of weights, order and augmentation")
     add("--threads", type=int, help="threads for the network (default: all cores)")
     add("--resume", action="store_true", help="continue from the checkpoint beside the weights file")
@@ -77,24 +112,60 @@ def main(args: argparse.Namespace) -> int:
     if args.threads is not None:
         torch.set_num_threads(args.threads)
     out: Path = args.out or paths.WEIGHTS / f"{config.name}.safetensors"
-    separate = GraspDataset(args.validation, holdout=0) if args.validation else None
-    dataset = GraspDataset(args.data, holdout=0 if separate else config.holdout)
-    trainer = Trainer(config, dataset, out, separate)
+    colour = config.input.reads_colour
+    separate = GraspDataset(args.validation, holdout=0, colour=colour) if args.validation else None
+    dataset = GraspDataset(
+        args.data, holdout=0 if separate else config.holdout, colour=colour, images=config.images
+    )
+    curves = args.curves / f"{out.stem}.csv" if args.curves else None
+    trainer = Trainer(config, dataset, out, separate, curves=curves, command=command_line(args))
     with ProgressLog() as log:
         resumed = args.resume and trainer.resume()
         log.note(
             f"{config.name}: {trainer.parameters / 1e6:.2f} M parameters, {len(dataset.training)} images of "
-            f"{dataset.scene_count} scenes to train on, {len(trainer.validation_images)} to validate on"
+            f"{dataset.scene_count} scenes to train on, {len(trainer.validator.images)} to validate on"
             + (f"; resumed at step {trainer.step}" if resumed else "")
         )
-        try:
+        with _stopping(trainer):
             best = trainer.run(log)
-        except KeyboardInterrupt:
-            trainer.save_checkpoint()
+        if trainer.progress < 1:
             log.note(f"stopped at step {trainer.step}; continue with --resume")
             return 130
     print(json.dumps({"weights": str(out), "steps": trainer.step, "validation": best}))
     return 0
+
+
+@contextmanager
+def _stopping(trainer: Trainer) -> Iterator[None]:
+    """The first Ctrl-C or SIGTERM ends the run between two steps, so that it can be resumed to the bit."""
+
+    def stop(signum: int, frame: object) -> None:
+        trainer.stop()
+        restore()
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    for number in before:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        restore()
+
+
+def command_line(args: argparse.Namespace) -> str:
+    """The command that the arguments stand for, without what is at its default."""
+    words = ["python", "-m", "mpgrasp.training", "train", args.name]
+    for name, value in vars(args).items():
+        if name in NOT_OPTIONS or value == args.default_of(name):
+            continue
+        values = value if isinstance(value, list) else [] if value is True else [value]
+        words += [f"--{name.replace('_', '-')}", *map(str, values)]
+    return shlex.join(words)
 
 
 def config_from(args: argparse.Namespace) -> TrainConfig:
@@ -103,7 +174,6 @@ def config_from(args: argparse.Namespace) -> TrainConfig:
     Raises:
         ConfigError: settings that cannot be used.
     """
-    from mpgrasp.detectors.network_input import NetworkInput
     from mpgrasp.training.augmentation import Augmentation
     from mpgrasp.training.trainer_config import LossConfig
 
@@ -116,7 +186,12 @@ def config_from(args: argparse.Namespace) -> TrainConfig:
     return TrainConfig(
         name=args.name,
         settings=settings,
-        input=NetworkInput(centre=args.centre, scale=args.scale, range_channel=args.range),
+        input=NetworkInput(
+            size=INPUT_SIZE.get(args.name, NETWORK_SIZE),
+            modality=args.input,
+            centre=args.centre,
+            scale=args.scale,
+        ),
         loss=LossConfig(positive=args.positive, background=args.background, beta=args.beta),
         augmentation=None if args.no_augmentation else Augmentation(),
         epochs=args.epochs,
@@ -126,7 +201,12 @@ def config_from(args: argparse.Namespace) -> TrainConfig:
         schedule=args.schedule,
         weight_decay=args.weight_decay,
         average=args.average,
+        precision=args.precision,
         thin_weight=args.thin_weight,
+        images=args.images,
+        validation_images=args.validation_images,
+        lift_images=args.lift_images,
+        validate_every=args.validate_every,
         seed=args.seed,
         holdout=args.holdout,
     )

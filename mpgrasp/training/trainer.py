@@ -1,9 +1,13 @@
 """Training a network on shards, within a budget of epochs or minutes.
 
 Defaults are the paper's (Section IV-A): AdamW, learning rate 1e-4, weight decay 5e-2, batches of 32, 50
-epochs. A budget of minutes can take the place of epochs; the learning rate is annealed over whichever is
-given. Convolutions run in bfloat16, images with channels last. What is validated and saved is a running
-average of the weights.
+epochs. It names no schedule: after a warm-up the rate falls along a cosine, over epochs or over a budget of
+minutes, whichever is given. Biases, normalisations and relative positions are not decayed, as is usual.
+Convolutions run in bfloat16, images with channels last. What is validated and saved is a running average of
+the weights.
+
+A run measured in epochs is a function of the settings, the seed and the data: on a CPU, one that was stopped
+and resumed gives the same weights to the bit as one that was not.
 """
 
 from __future__ import annotations
@@ -11,37 +15,56 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
+from torch import Tensor, nn
 
-from mpgrasp.detectors.network_detector import postprocess
-from mpgrasp.detectors.weights import WIDTH_PX, NetworkWeights, build_network, save_weights
-from mpgrasp.exceptions import OutputError, WeightsError
-from mpgrasp.training.dataset import Batch, GraspDataset
-from mpgrasp.training.losses import grasp_loss
-from mpgrasp.training.metrics import format_summary, judge, summarise
+from mpgrasp.depth import NETWORK_SIZE
+from mpgrasp.detectors.networks import build_network
+from mpgrasp.detectors.weights import WIDTH_PX, NetworkWeights, save_weights
+from mpgrasp.exceptions import ConfigError, WeightsError
+from mpgrasp.training.batches import Batches
+from mpgrasp.training.card import training_card
+from mpgrasp.training.checkpoint import read_checkpoint, write_checkpoint
+from mpgrasp.training.curves import write_curves
+from mpgrasp.training.dataset import GraspDataset
+from mpgrasp.training.losses import PARTS, grasp_loss
+from mpgrasp.training.metrics import format_summary
 from mpgrasp.training.progress import ProgressLog
 from mpgrasp.training.trainer_config import TrainConfig
+from mpgrasp.training.validation import SELECT_BY, Validator
 
-CHECKPOINT_FORMAT = "mpgrasp-checkpoint-1"
-LICENCE = "Apache-2.0"
 WARM_UP = 0.03
 """Share of the budget over which the learning rate rises."""
 FLOOR = 0.01
 """Learning rate at the end, as a share of the highest."""
+MAX_GRADIENT = 5.0
+"""Gradients are shortened to this norm."""
 CHECKPOINT_EVERY = 180.0
 """[s]"""
+RESUMED = ("step", "elapsed", "validated", "best", "history")
+"""Plain values of a run that a checkpoint holds."""
+READ_EVERY = 20
+"""Losses of a GPU are read after so many steps, since each reading waits for it."""
 
 
 class Trainer:
-    """One training run: steps, validation, checkpoints and the weights file `out`.
+    """One training run: steps, validation, checkpoints, curves, and the weights file `out`.
 
     Validation images are all of `validation`, where there is one, and else what `dataset` holds out.
+
+    Args:
+        config: how to train.
+        dataset: what to train on.
+        out: weights file; the checkpoint lies beside it.
+        validation: what to validate on.
+        curves: CSV file of the curves, with a PNG beside it; by default they lie beside `out`.
+        command: what the run was started with, for the training card.
+
+    Raises:
+        ConfigError: a network that cannot be built, or data that cannot be validated on.
     """
 
     def __init__(
@@ -50,33 +73,47 @@ class Trainer:
         dataset: GraspDataset,
         out: Path,
         validation: GraspDataset | None = None,
+        *,
+        curves: Path | None = None,
+        command: str = "",
     ) -> None:
-        self.config = config
-        self.dataset = dataset
+        self.config, self.dataset, self.out = config, dataset, out
         self.validation = validation or dataset
-        self.out = out
+        self.curves, self.command = curves or out.with_suffix(".csv"), command
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         settings = {**config.settings, "channels": config.input.channels}
         with torch.random.fork_rng():
             torch.manual_seed(config.seed)
             network = build_network(config.name, settings)
         self.weights = NetworkWeights(
-            name=config.name, network=network, settings=settings, input=config.input
+            name=config.name,
+            network=network,
+            settings=settings,
+            input=config.input,
+            # a width output of 1 is the same share of every image
+            width_px=WIDTH_PX * config.input.size / NETWORK_SIZE,
         )
         network.to(device=self.device)
         self.network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.validator = Validator(
+            config, self.validation, self.weights.width_px, self.device, held=self.validation is dataset
+        )
+        self.batches = Batches(config, dataset, self.weights.width_px, self.device)
         self.optimiser = torch.optim.AdamW(
-            self.network.parameters(), lr=config.lr, weight_decay=config.weight_decay
+            _parameter_groups(self.network, config.weight_decay), lr=config.lr, fused=True
         )
         self.average = {k: v.detach().clone() for k, v in self.network.state_dict().items()}
         self.step = 0
         self.elapsed = 0.0
         self.validated = 0.0
         self.best: dict[str, float] = {}
+        self.history: list[dict[str, float]] = []
+        self._losses = torch.zeros(len(PARTS) + 1, dtype=torch.float64)  # sums since a validation, and steps
+        self._stopped = False
 
     @property
     def checkpoint(self) -> Path:
-        """Where the state of the run is kept until it is done."""
+        """Where the state of the run is kept."""
         return self.out.with_suffix(".checkpoint")
 
     @property
@@ -94,71 +131,62 @@ class Trainer:
     @property
     def total_steps(self) -> int:
         """Steps of a run that is measured in epochs."""
-        return max(1, math.ceil(self.config.epochs * len(self.dataset.training) / self.config.batch))
+        return max(1, math.ceil(self.config.epochs * len(self.batches) / self.config.batch))
+
+    def stop(self) -> None:
+        """End `run` after the step that is under way."""
+        self._stopped = True
 
     def run(self, log: ProgressLog, *, stop_after: int | None = None) -> dict[str, float]:
         """Train to the end of the budget, or for `stop_after` steps, and return the best validation.
 
         Raises:
-            OutputError: weights or checkpoint cannot be written.
+            ConfigError: the loss is no longer finite.
+            OutputError: weights, curves or checkpoint cannot be written.
         """
         last_step = self.step + stop_after if stop_after is not None else None
         start, saved = time.monotonic() - self.elapsed, time.monotonic()
-        with ThreadPoolExecutor(1) as loader:
-            upcoming = loader.submit(self._draw, self.step)
-            while self.progress < 1 and self.step != last_step:
-                batch, upcoming = self._next(loader, upcoming)
-                losses = self.train_step(batch)
+        batches = self.batches.ahead(self.step)
+        pending: list[Tensor] = []
+        every = 1 if self.device.type == "cpu" else READ_EVERY
+        while self.progress < 1 and self.step != last_step and not self._stopped:
+            pending.append(self.train_step(next(batches)))
+            self.elapsed = time.monotonic() - start
+            due = self.progress >= min(self.validated + self.config.validate_every, 1.0)
+            if due or len(pending) == every:
+                self._read_losses(pending, log)
+                pending = []
+            if due:
+                batches.close()  # nobody reads the shards while more are added
+                self._validate(log)
+                batches = self.batches.ahead(self.step)
                 self.elapsed = time.monotonic() - start
-                log.update(self.progress, self.step, self.step * self.config.batch, losses)
-                if self.progress >= min(self.validated + self.config.validate_every, 1.0):
-                    upcoming.result()  # nobody reads the shards while more are added
-                    self._validate(log)
-                    upcoming = loader.submit(self._draw, self.step)
-                    self.elapsed = time.monotonic() - start
-                if time.monotonic() - saved > CHECKPOINT_EVERY:
-                    self.save_checkpoint()
-                    saved = time.monotonic()
+            if time.monotonic() - saved > CHECKPOINT_EVERY:
+                self._read_losses(pending, log)
+                self.save_checkpoint()
+                pending, saved = [], time.monotonic()
+        batches.close()
+        self._read_losses(pending, log)
         self.save_checkpoint()
         return self.best
 
-    def train_step(self, batch: Batch) -> dict[str, float]:
-        """One step of the optimiser; returns the losses."""
+    def train_step(self, batch: tuple[Tensor, ...]) -> Tensor:
+        """One step of the optimiser on (image, quality, angle, width, valid); returns the losses `PARTS`."""
         self.network.train()
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.lr * self._rate()
-        image = torch.from_numpy(batch.image).to(self.device).contiguous(memory_format=torch.channels_last)
-        with torch.autocast(self.device.type, torch.bfloat16):
-            heads = self.network(image)
-        quality, angle, width, valid = (
-            torch.from_numpy(np.ascontiguousarray(a)).to(self.device)
-            for a in (batch.quality, batch.angle, batch.width / np.float32(WIDTH_PX), batch.valid)
-        )
+        image, quality, angle, width, valid = (t.to(self.device, non_blocking=True) for t in batch)
+        low = self.config.precision == "bfloat16"
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=low):
+            heads = self.network(image.contiguous(memory_format=torch.channels_last))
         parts = grasp_loss(heads, quality, angle, width, valid, self.config.loss)
         self.optimiser.zero_grad(set_to_none=True)
         parts["loss"].backward()
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        nn.utils.clip_grad_norm_(self.network.parameters(), MAX_GRADIENT)
         self.optimiser.step()
         self.step += 1
         self._update_average()
-        return {k: float(v.detach()) for k, v in parts.items()}
-
-    def _next(self, loader: ThreadPoolExecutor, upcoming: Future[Batch]) -> tuple[Batch, Future[Batch]]:
-        batch = upcoming.result()
-        return batch, loader.submit(self._draw, self.step + 1)
-
-    def _draw(self, step: int) -> Batch:
-        """The batch of that step: a function of the seed, the step and the data alone."""
-        rng = np.random.default_rng([self.config.seed, step])
-        images = self.dataset.training
-        thin = self.dataset.column("thin")
-        weight = np.ones(len(images))
-        if thin is not None:
-            weight[thin[images] > 0.5] = self.config.thin_weight
-        few = len(images) < self.config.batch
-        chosen = rng.choice(images, self.config.batch, replace=few, p=weight / weight.sum())
-        augmentation = self.config.augmentation
-        return self.dataset.batch(chosen, self.config.input, rng if augmentation else None, augmentation)
+        return torch.stack([parts[name].detach() for name in PARTS])
 
     def _rate(self) -> float:
         if self.progress < WARM_UP:
@@ -172,80 +200,54 @@ class Trainer:
     def _update_average(self) -> None:
         # young averages forget faster, so that the initial weights are soon gone
         decay = min(self.config.average, self.step / (self.step + 10)) if self.config.average else 0.0
-        for key, value in self.network.state_dict().items():
-            if value.is_floating_point():
-                self.average[key].lerp_(value, 1 - decay)
-            else:
-                self.average[key].copy_(value)
+        state = self.network.state_dict()
+        moving = [key for key, value in state.items() if value.is_floating_point()]
+        torch._foreach_lerp_([self.average[k] for k in moving], [state[k] for k in moving], 1 - decay)
+        for key in state.keys() - moving:
+            self.average[key].copy_(state[key])
+
+    def _read_losses(self, steps: list[Tensor], log: ProgressLog) -> None:
+        if not steps:
+            return
+        losses = torch.stack(steps).double().cpu()
+        if not losses.isfinite().all():
+            raise ConfigError(
+                "the loss is no longer finite", got=f"lr {self.config.lr:g}", allowed="a lower lr"
+            )
+        self._losses += torch.cat([losses.sum(dim=0), torch.tensor([len(steps)])])
+        means = dict(zip(PARTS, losses.mean(dim=0).tolist(), strict=True))
+        log.update(self.progress, self.step, self.step * self.config.batch, means)
 
     def _validate(self, log: ProgressLog) -> None:
         self.validated = self.progress
         summary = self.evaluate()
         log.note(f"{100 * self.progress:.0f} % validation  " + format_summary(summary))
         # equal counts as better: of two the one that was trained longer
-        if summary.get("hit", 0.0) >= self.best.get("hit", 0.0):
+        if summary.get(SELECT_BY, 0.0) >= self.best.get(SELECT_BY, 0.0):
             self.best = summary
             self.save()
+        *sums, steps = self._losses.tolist()
+        so_far = {"progress": self.progress, "step": self.step, "images": self.step * self.config.batch}
+        means = {name: value / max(steps, 1) for name, value in zip(PARTS, sums, strict=True)}
+        self.history.append({**so_far, "minutes": self.elapsed / 60, **means, **summary})
+        self._losses.zero_()
+        write_curves(self.curves, self.history)
         arrived = self.dataset.refresh()
         if arrived:
             log.note(f"{arrived} more shards, {len(self.dataset.training)} training images")
 
-    @property
-    def validation_images(self) -> np.ndarray:
-        """Indices into `validation`, the same ones every time."""
-        data = self.validation
-        images = data.held if data is self.dataset else np.arange(len(data))
-        return np.random.default_rng(0).permutation(images)[: self.config.validation_images]
-
-    @torch.inference_mode()
     def evaluate(self) -> dict[str, float]:
-        """Validation of the averaged weights; see metrics.summarise."""
-        images = self.validation_images
+        """Validation of the averaged weights; see Validator."""
         own = {k: v.clone() for k, v in self.network.state_dict().items()}
         self.network.load_state_dict(self.average)
-        self.network.eval()
-        verdicts, graspable = {}, {}
-        for chunk in np.array_split(images, max(1, math.ceil(len(images) / 16))):
-            for i, heads in zip(chunk.tolist(), self._heads(chunk), strict=True):
-                truth = self.validation.sample(i)
-                verdicts[i] = judge(*postprocess(heads, WIDTH_PX), truth)
-                graspable[i] = bool(truth.quality.any())
+        summary = self.validator.evaluate(self.network)
         self.network.load_state_dict(own)
-        return summarise(verdicts, graspable, self.validation)
-
-    def _heads(self, images: np.ndarray) -> np.ndarray:
-        if not len(images):
-            return np.zeros((0, 4, 0, 0), np.float32)
-        batch = torch.from_numpy(self.validation.batch(images, self.config.input).image).to(self.device)
-        with torch.autocast(self.device.type, torch.bfloat16):
-            heads = self.network(batch.contiguous(memory_format=torch.channels_last))
-        return torch.cat(heads, dim=1).float().cpu().numpy()
+        return summary
 
     def save(self) -> None:
         """Write the averaged weights with their training card."""
-        weights = dataclasses.replace(self.weights, card=self._card())
+        weights = dataclasses.replace(self.weights, card=training_card(self))
         save_weights(self.out, weights, self.average)
-
-    def _card(self) -> dict[str, Any]:
-        config = self.config
-        return {
-            "data": self.dataset.description(),
-            "validation_data": self.validation.description(),
-            "training_images": len(self.dataset.training),
-            "training_scenes": self.dataset.scene_count,
-            "images_seen": self.step * config.batch,
-            "steps": self.step,
-            "minutes": round(self.elapsed / 60, 1),
-            "device": self.device.type,
-            "threads": torch.get_num_threads(),
-            "torch": torch.__version__,
-            "seed": config.seed,
-            "parameters": self.parameters,
-            "optimiser": f"AdamW, lr {config.lr:g} {config.schedule}, weight decay {config.weight_decay:g}",
-            "config": {k: v for k, v in asdict(config).items() if k not in ("name", "settings", "input")},
-            "validation": {k: round(v, 4) for k, v in self.best.items()},
-            "licence": LICENCE,
-        }
 
     def save_checkpoint(self) -> None:
         """Write everything that a later `resume` needs.
@@ -254,42 +256,39 @@ class Trainer:
             OutputError: the file cannot be written.
         """
         state = {
-            "format": CHECKPOINT_FORMAT,
-            "name": self.config.name,
-            "settings": dict(self.weights.settings),
             "network": self.network.state_dict(),
             "average": self.average,
             "optimiser": self.optimiser.state_dict(),
-            "step": self.step,
-            "elapsed": self.elapsed,
-            "validated": self.validated,
-            "best": self.best,
+            "losses": self._losses,
+            **{name: getattr(self, name) for name in RESUMED},
         }
-        temporary = self.checkpoint.with_name(self.checkpoint.name + ".part")
-        try:
-            temporary.parent.mkdir(parents=True, exist_ok=True)
-            torch.save(state, temporary)
-            temporary.replace(self.checkpoint)
-        except (OSError, RuntimeError) as error:
-            raise OutputError(f"checkpoint cannot be written: {error}", got=str(self.checkpoint)) from error
+        write_checkpoint(self.checkpoint, self.config, state)
 
     def resume(self) -> bool:
         """Continue where the checkpoint left off; False where there is none.
 
         Raises:
-            WeightsError: the checkpoint is unreadable or of another network.
+            WeightsError: the checkpoint is unreadable or of a run with other settings.
         """
         if not self.checkpoint.is_file():
             return False
+        state = read_checkpoint(self.checkpoint, self.config, self.device)
         try:
-            state = torch.load(self.checkpoint, map_location=self.device, weights_only=True)
-            if state["format"] != CHECKPOINT_FORMAT or state["name"] != self.config.name:
-                raise KeyError("made for another network")
             self.network.load_state_dict(state["network"])
             self.optimiser.load_state_dict(state["optimiser"])
-        except Exception as error:  # torch names no common base for what a broken file may raise
+            self.average, self._losses = state["average"], state["losses"].cpu()
+            for name in RESUMED:
+                setattr(self, name, state[name])
+        except (KeyError, ValueError, RuntimeError) as error:
             raise WeightsError(f"checkpoint cannot be used: {error}", got=str(self.checkpoint)) from error
-        self.average = state["average"]
-        self.step, self.elapsed = int(state["step"]), float(state["elapsed"])
-        self.validated, self.best = float(state["validated"]), dict(state["best"])
         return True
+
+
+def _parameter_groups(network: nn.Module, weight_decay: float) -> list[dict[str, Any]]:
+    """Weights that are decayed, and biases, normalisations and relative positions, which are not."""
+    named = list(network.named_parameters())
+    free = {name for name, p in named if p.ndim < 2 or name.endswith("bias")}
+    return [
+        {"params": [p for name, p in named if name not in free], "weight_decay": weight_decay},
+        {"params": [p for name, p in named if name in free], "weight_decay": 0.0},
+    ]

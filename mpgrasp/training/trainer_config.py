@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mpgrasp.detectors.network_input import NetworkInput
+from mpgrasp.detectors.networks import NETWORKS
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation
 
-TRAINABLE = ("dhrnet", "ggcnn")
+TRAINABLE = tuple(NETWORKS)
 """Networks that can be trained."""
 
 
@@ -56,20 +57,26 @@ class TrainConfig:
     """Images a step."""
     lr: float = 1e-4
     """Highest learning rate."""
+    precision: str = "bfloat16"
+    """Of the convolutions: "bfloat16", or "float32" where the processor does not compute in that."""
     schedule: str = "cosine"
-    """"cosine" down to a hundredth, or "constant"; either after a warm-up."""
+    """"cosine" down to a hundredth, or "constant"; either after a warm-up. The paper names none."""
     weight_decay: float = 5e-2
-    """AdamW's."""
+    """AdamW's, of everything but biases, normalisations and relative positions."""
     average: float = 0.998
     """Decay per step of the running average of the weights; 0 saves the weights themselves."""
     thin_weight: float = 1.0
     """How much oftener images of thin objects are drawn."""
+    images: int | None = None
+    """Train on the first so many images only; None takes all."""
     seed: int = 0
     """Of initial weights, order and augmentation."""
     holdout: float = 0.08
     """Share of scenes for validation."""
     validation_images: int = 384
     """At most so many images are validated on."""
+    lift_images: int = 48
+    """At most so many of them are also grasped in simulation, where the network would."""
     validate_every: float = 0.1
     """Share of the budget between validations."""
 
@@ -78,10 +85,16 @@ class TrainConfig:
             raise ConfigError("unknown network", got=self.name, allowed=TRAINABLE)
         if self.schedule not in ("cosine", "constant"):
             raise ConfigError("unknown schedule", got=self.schedule, allowed=("cosine", "constant"))
+        if self.precision not in ("bfloat16", "float32"):
+            raise ConfigError("unknown precision", got=self.precision, allowed=("bfloat16", "float32"))
         positive = (self.epochs, self.batch, self.lr, self.validate_every, self.thin_weight)
         if min(positive) <= 0 or (self.minutes is not None and self.minutes <= 0):
             raise ConfigError(
                 "unusable training settings", got=self, allowed="sizes, times and rates above 0"
+            )
+        if min(self.validation_images, self.lift_images) < 0 or (self.images is not None and self.images < 1):
+            raise ConfigError(
+                "unusable number of images", got=self, allowed="0 or more, 1 or more to train on"
             )
         if not 0 <= self.average < 1:
             raise ConfigError("unusable running average", got=self.average, allowed="from 0 to below 1")

@@ -1,0 +1,92 @@
+"""Shards on disk: what they hold, `meta.json` that says so, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from mpgrasp.depth import CROP, NETWORK_SIZE
+from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.training.generate_config import GenerateConfig
+from mpgrasp.training.labels import ANGLE_UNIT, DEPTH_UNIT, QUALITY_UNIT
+from mpgrasp.training.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMNS
+from mpgrasp.training.views import META_COLUMNS
+
+FORMAT = 2
+"""Of shards and `meta.json`."""
+SHARD_SCENES = 20
+"""Scenes in a shard."""
+
+
+def describe(config: GenerateConfig) -> dict[str, object]:
+    """What `meta.json` says."""
+    return {
+        "format": FORMAT,
+        "seed": config.seed,
+        "views": config.views,
+        "camera": config.camera,
+        "colour": config.colour,
+        "shard_scenes": SHARD_SCENES,
+        "size": NETWORK_SIZE,
+        "crop": CROP,
+        "depth_unit_m": DEPTH_UNIT,
+        "quality_unit": QUALITY_UNIT,
+        "angle_unit_rad": ANGLE_UNIT,
+        "angle_zero_bin": 128,
+        "good_quality": GOOD,
+        "meta_columns": list(META_COLUMNS),
+        "trial_columns": list(TRIAL_COLUMNS),
+        "lift_outcomes": list(LIFT_OUTCOMES),
+    }
+
+
+def prepare(config: GenerateConfig, out: Path) -> None:
+    """Make the directory and describe the data set in `meta.json`, or check that it is the same one.
+
+    Raises:
+        ConfigError: the directory holds data of another configuration.
+        OutputError: it cannot be written.
+    """
+    path = out / "meta.json"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if path.is_file():
+            if json.loads(path.read_text(encoding="utf-8")) != describe(config):
+                raise ConfigError(
+                    "the directory holds other data", got=str(out), allowed="an empty directory"
+                )
+            return
+        path.write_text(json.dumps(describe(config), indent=2) + "\n", encoding="utf-8")
+    except (OSError, ValueError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise OutputError("cannot write training data", got=str(out), allowed=str(error)) from None
+
+
+def shard_path(out: Path, first_scene: int) -> Path:
+    """Where the shard lies that begins with that scene."""
+    return out / f"shard_{first_scene // SHARD_SCENES:05d}.npz"
+
+
+def write_shard(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """An npz file, packed fast, whose bytes depend on the arrays alone; there at once, or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    partial = path.with_suffix(".part")
+    try:
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for name, array in sorted(arrays.items()):
+                buffer = io.BytesIO()
+                np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+                entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                archive.writestr(entry, buffer.getvalue(), compresslevel=1)
+        partial.replace(path)
+    except OSError as error:
+        raise OutputError("cannot write a shard", got=str(path), allowed=str(error)) from None
