@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,18 +17,10 @@ from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.grasp import GraspMap, world_to_image_angle
 from mpgrasp.height_map import HeightMap
 
-FILE = Path(__file__).resolve().parent.parent / "benchmarks" / "thickness.py"
-
 
 @pytest.fixture(scope="module")
 def thickness() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("thickness", FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["thickness"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+    return importlib.import_module("thickness")
 
 
 def some_map(frame: DepthFrame, row: int, col: int, angle: float, quality: float) -> GraspMap:
@@ -167,17 +158,19 @@ def _flat_frame(T_world_camera: FloatArray) -> DepthFrame:
 def test_the_same_seed_gives_the_same_file_and_a_picture(
     thickness: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(thickness, "load_detector", lambda name: {"guesses": Guesses, "blind": Blind}[name]())
+    study = importlib.import_module("study")
+    monkeypatch.setattr(study, "load_detector", lambda name: {"guesses": Guesses, "blind": Blind}[name]())
     command = ["--detector", "guesses,blind", "--scenes", "1", "--seed", "4", "--out", str(tmp_path / "new")]
     texts = []
     for _ in range(2):
         assert thickness.main(command) == 0
-        texts.append((tmp_path / "new" / "thickness.json").read_bytes())
+        files = ("run.json", "thickness.json", "thickness.csv", "thickness.png")
+        texts.append([(tmp_path / "new" / name).read_bytes() for name in files])
     assert texts[0] == texts[1]
-    report: dict[str, Any] = json.loads(texts[0])
-    assert report["study"]["seed"] == 4
-    assert len(report["scene_seeds"]) == 1
-    assert len(report["cells"]) == 2 * 9 * 4
+    run: dict[str, Any] = json.loads(texts[0][0])
+    assert run["study"]["seed"] == 4
+    assert len(run["scene_seeds"]) == 1
+    assert len(json.loads(texts[0][1])["cells"]) == len(texts[0][2].splitlines()) - 1 == 2 * 9 * 4
     with Image.open(tmp_path / "new" / "thickness.png") as picture:
         assert picture.width > picture.height > 300
     printed = capsys.readouterr().out
