@@ -50,6 +50,13 @@ class EpisodeResult:
     """Way of the tool point during the reach [m]."""
     jerk_rms: float
     """Root mean square jerk of the tool point during the reach [m/s3]."""
+    spectral_arc_length: float
+    """Smoothness of the reach: about -1.4 for one smooth movement, lower the more it stops and starts; NaN
+    without a reach."""
+    first_detection_s: float | None
+    """Time of the first look whose quality map had a peak [s]; None if none had."""
+    blind_drift_m: float
+    """Horizontal way of the tool point before that [m]."""
     grasp: Grasp | None
     """The grasp that was executed."""
     timing: Mapping[str, float]

@@ -53,11 +53,19 @@ def one_line(record: Mapping[str, Any]) -> str:
 
 
 def difference(a: Any, b: Any, where: str = "") -> str | None:
-    """The first place in which two plain values differ, as "path: a there, b here"; None if equal."""
+    """The first place in which two plain values differ, as "path: a there, b here"; None if equal.
+
+    Lists of dicts are gone through item by item if they are of one length; other lists are given as a whole.
+    """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in [*a, *(k for k in b if k not in a)]:
             found = difference(a.get(key), b.get(key), f"{where}.{key}" if where else key)
             if found:
                 return found
         return None
+    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        for k, (ours, theirs) in enumerate(zip(a, b, strict=True)):
+            found = difference(ours, theirs, f"{where}.{k}") if isinstance(ours, dict) else None
+            if found:
+                return found
     return None if a == b else f"{where}: {json.dumps(a)} there, {json.dumps(b)} here"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +36,10 @@ class FakeController:
 
 
 class OtherController(FakeController):
+    pass
+
+
+class OtherDetector(FakeDetector):
     pass
 
 
@@ -68,35 +75,80 @@ class FakeResult:
         }
 
 
+def _seed(episode: int) -> int:
+    from mpgrasp.bench.suite import episode_seed
+
+    return episode_seed("thin", 0, episode)
+
+
 def run_episode(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     return FakeResult(seed, scene_config)
 
 
 def slow_first_episode(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     """Later episodes are ready before the first one."""
-    from mpgrasp.bench.suite import episode_seed
-
-    time.sleep(0.5 if seed == episode_seed("thin", 0, 0) else 0.0)
+    time.sleep(0.5 if seed == _seed(0) else 0.0)
     return FakeResult(seed, scene_config)
 
 
 def breaks_off(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     """Every episode but the first finds a bug."""
-    from mpgrasp.bench.suite import episode_seed
-
-    if seed != episode_seed("thin", 0, 0):
+    if seed != _seed(0):
         raise ZeroDivisionError("a bug in a detector")
     return FakeResult(seed, scene_config)
 
 
-def dies(scene_config: Any, seed: int, **_: Any) -> FakeResult:
-    """As a process does that runs out of memory."""
-    import os
+def crashes(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Ends its process in three ways: of its own accord, as one that runs out of memory, by a bad pointer."""
+    if seed == _seed(1):
+        os._exit(9)
+    if seed == _seed(2):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if seed == _seed(3):
+        ctypes.string_at(0)
+    return FakeResult(seed, scene_config)
 
-    os._exit(9)
+
+def hangs(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Never comes back from episode 1."""
+    if seed == _seed(1):
+        time.sleep(3600)
+    return FakeResult(seed, scene_config)
+
+
+def dies_once(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Ends its process in episode 1 unless that has happened before."""
+    if seed == _seed(1):
+        try:
+            Path(os.environ["MPGRASP_TEST_MARK"]).touch(exist_ok=False)
+        except FileExistsError:
+            return FakeResult(seed, scene_config)
+        os._exit(9)
+    return FakeResult(seed, scene_config)
+
+
+def brisk(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Takes 2 ms."""
+    time.sleep(0.002)
+    return FakeResult(seed, scene_config)
 
 
 def unhurried(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     """Slow enough to be interrupted."""
     time.sleep(0.1)
     return FakeResult(seed, scene_config)
+
+
+def ends_at_once(*_: Any) -> None:
+    """A worker that does not get as far as its first episode."""
+    os._exit(3)
+
+
+def other_world(scene_config: Any, seed: int, **_: Any) -> Any:
+    """As if the code had changed: one tick more."""
+
+    class Longer(FakeResult):
+        def as_record(self) -> dict[str, Any]:
+            return {**super().as_record(), "ticks": 51}
+
+    return Longer(seed, scene_config)

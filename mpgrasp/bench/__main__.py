@@ -1,48 +1,53 @@
-"""The benchmark's command line: `python -m mpgrasp.bench SUITE --detector D --controller C ...`."""
+"""The benchmark's command line: `python -m mpgrasp.bench SUITE ...`, and `compare` and `replay` of runs."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
-import shlex
 import sys
-import traceback
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
-from typing import Any, NoReturn
 
+from mpgrasp.bench.command_line import Parser
 from mpgrasp.exceptions import ConfigError, MpgraspError
 
-EXIT_BROKEN, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+SUBCOMMANDS = ("compare", "replay")
+"""Words in the place of SUITE that do something with runs that are there."""
 
 _EPILOG = """\
 examples:
   python -m mpgrasp.bench thin
   python -m mpgrasp.bench thin --detector dhrnet,ggcnn,oracle --controller mppc,mvp --episodes 100 --workers 2
   python -m mpgrasp.bench unseen --detector my_net:MyDetector --weights my_net.pt --record 3
+  python -m mpgrasp.bench thin --episodes 50 --until-ci 10
+  python -m mpgrasp.bench --resume runs/thin-20260101-120000
+  python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
+  python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
 
 Every detector and every controller meets the same scenes, sensor noise and start poses. The same
 command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
 process computes on one thread (set OMP_NUM_THREADS to change that).
 
-exit code: 0 all episodes played, 1 an episode broke off, 2 unusable input, 130 interrupted (Ctrl-C);
-finished episodes are kept in every case.
+An episode whose process crashes, hangs or raises an error is played once more, and is then an error row,
+with its traceback in errors/: counted apart from failures. A run that was killed loses the episodes in
+hand; --resume plays those and the rest, and tries error rows again.
+
+exit code: 0 all episodes played, 1 some could not be played, 2 unusable input or output, 130 interrupted
+(Ctrl-C); finished episodes are kept in every case.
 """
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(message, allowed=f"see {self.prog} --help")
 
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
+    from mpgrasp.bench.plan import CAMERA_BACKENDS
     from mpgrasp.bench.plugins import controller_names, detector_names
-    from mpgrasp.bench.runner import CAMERA_BACKENDS
     from mpgrasp.bench.suite import suite_names
+    from mpgrasp.bench.workers import HANG_AFTER
+    from mpgrasp.detectors import RUNTIMES
 
-    parser = _Parser(
+    parser = Parser(
         prog="python -m mpgrasp.bench",
         description="Closed-loop grasping in simulation: play a suite, print the table, write the results.",
         epilog=_EPILOG,
@@ -50,7 +55,12 @@ def make_parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("suite", metavar="SUITE", help=f"{', '.join(suite_names())}, or a path to a declaration.toml")
+    add(
+        "suite",
+        metavar="SUITE",
+        nargs="?",
+        help=f"{', '.join(suite_names())}, or a path to a declaration.toml; may be left out with --resume",
+    )
     add(
         "--detector",
         metavar="D[,D]",
@@ -64,8 +74,29 @@ def make_parser() -> argparse.ArgumentParser:
         help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc)",
     )
     add("--episodes", metavar="N", type=int, default=10, help="episodes of each combination (default: 10)")
+    add(
+        "--until-ci",
+        metavar="W",
+        type=float,
+        help="go on in batches of N episodes until every 95 %% interval is narrower than W points "
+        "(stopping by the result makes intervals slightly too narrow)",
+    )
+    add(
+        "--max-episodes",
+        metavar="M",
+        type=int,
+        default=1000,
+        help="where --until-ci ends in any case (default: 1000)",
+    )
     add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
+    add(
+        "--resume",
+        metavar="DIR",
+        type=Path,
+        help="finish the run in DIR, by the command it was begun with; refused if anything has changed that "
+        "decides its results",
+    )
     add(
         "--record",
         metavar="N",
@@ -82,122 +113,61 @@ def make_parser() -> argparse.ArgumentParser:
         "one detector; may be given several times",
     )
     add(
+        "--runtime",
+        metavar="|".join(RUNTIMES),
+        default="auto",
+        help="what computes the networks (default: auto, the fastest one here)",
+    )
+    add(
         "--camera",
         metavar="|".join(CAMERA_BACKENDS),
         default="auto",
         help="rasterised through OpenGL, ray-cast without it, or whichever is there (default: auto)",
     )
     add("--no-noise", action="store_true", help="a perfect depth camera")
-    add("--workers", metavar="K", type=int, default=1, help="play in K processes (default: 1)")
+    add(
+        "--workers",
+        metavar="K",
+        type=int,
+        default=len(os.sched_getaffinity(0)),
+        help="play in K processes (default: one per core); 0 plays in this one, for debuggers",
+    )
+    add(
+        "--hang-after",
+        metavar="S",
+        type=float,
+        default=HANG_AFTER,
+        help=f"seconds after which an episode's process is taken for hung (default: {HANG_AFTER:g})",
+    )
     add("--quiet", action="store_true", help="no progress, only the table")
     return parser
 
 
-def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
-    """Play what the command line asks for.
-
-    Returns:
-        The exit code.
+def parse(command: Sequence[str]) -> argparse.Namespace:
+    """Arguments of a run, those of a resumed one taken from its run.json.
 
     Raises:
-        MpgraspError: input that cannot be used.
+        ConfigError: unusable arguments.
+        OutputError: nothing to resume.
     """
-    from mpgrasp.bench.plugins import check_name, controller_names, detector_names, parse_weights
-    from mpgrasp.bench.report import ProgressReport, print_table
-    from mpgrasp.bench.run_directory import RunDirectory
-    from mpgrasp.bench.runner import EpisodeError, Plan, Player, play_all
-    from mpgrasp.bench.statistics import summarise
-    from mpgrasp.bench.suite import load_suite
+    parser = make_parser()
+    arguments = parser.parse_args(command)
+    if arguments.resume is None:
+        if arguments.suite is None:
+            raise ConfigError(
+                "the following arguments are required: SUITE", allowed=f"see {parser.prog} --help"
+            )
+        return arguments
+    if arguments.out is not None:
+        raise ConfigError("--out beside --resume", got=str(arguments.out), allowed="one of both")
+    if arguments.suite is None:
+        from mpgrasp.bench.description import command_of
+        from mpgrasp.bench.run_files import read_run
 
-    detectors, controllers = (tuple(names.split(",")) for names in (arguments.detector, arguments.controller))
-    for name in detectors:
-        check_name("detector", name, detector_names())
-    for name in controllers:
-        check_name("controller", name, controller_names())
-    if arguments.workers < 1:
-        raise ConfigError("workers out of range", got=arguments.workers, allowed="1 or more")
-    suite = load_suite(arguments.suite)
-    out = arguments.out or Path("runs") / f"{suite.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    plan = Plan(
-        suite=suite,
-        detectors=detectors,
-        controllers=controllers,
-        weights=parse_weights(arguments.weights, detectors),
-        episodes=arguments.episodes,
-        seed=arguments.seed,
-        camera=arguments.camera,
-        noise=not arguments.no_noise,
-        record=arguments.record,
-        recordings=out / "recordings",
-    )
-    player = Player(plan)  # whatever is wrong with a detector or controller shows before the first episode
-    directory = RunDirectory.create(out, describe(plan, player, command))
-    code = 0
-    try:
-        with ProgressReport(len(plan.tasks()), quiet=arguments.quiet) as progress:
-
-            def finished(line: dict[str, Any]) -> None:
-                directory.append(line)
-                progress.add(line)
-
-            play_all(plan, finished, workers=arguments.workers, player=player)
-    except KeyboardInterrupt:
-        print("mpgrasp: interrupted; the finished episodes are kept", file=sys.stderr)
-        code = EXIT_INTERRUPTED
-    except EpisodeError as error:
-        details = directory.write_text("traceback.txt", traceback.format_exc())
-        print(f"mpgrasp: error: {error}; see {details}", file=sys.stderr)
-        code = EXIT_BROKEN
-    finally:
-        cells = summarise(directory.episodes())
-        directory.write_summary(cells, complete=sum(cell["n"] for cell in cells) == len(plan.tasks()))
-        directory.close()
-        print_table(cells)
-        print(f"Results: {out}")
-    return code
-
-
-def describe(plan: Any, player: Any, command: Sequence[str]) -> dict[str, Any]:
-    """Content of run.json: all that decides the results, and what they were made with.
-
-    `configuration` is what two runs in one folder must agree in.
-    """
-    from mpgrasp.bench.provenance import provenance, sha256
-    from mpgrasp.bench.world_card import world_card
-    from mpgrasp.detectors.detector import reads_truth
-    from mpgrasp.paths import WEIGHTS
-
-    return {
-        "format": 1,
-        "command": shlex.join(["python", "-m", "mpgrasp.bench", *command]),
-        "started": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "configuration": {
-            "suite": plan.suite,
-            "episode": player.episode_config,
-            "detectors": [
-                {
-                    "name": name,
-                    "weights": str(given) if (given := plan.weights.get(name)) else None,
-                    # of the shipped weights where none are given; a plug-in's own are its own affair
-                    "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
-                    "reads_truth": reads_truth(detector),
-                    "device": getattr(detector, "device", None),
-                    "config": getattr(detector, "config", None),
-                }
-                for name, detector in player.detectors.items()
-            ],
-            "controllers": [
-                {"name": name, "config": getattr(controller, "config", None)}
-                for name, controller in player.controllers.items()
-            ],
-            "episodes": plan.episodes,
-            "seed": plan.seed,
-            "camera": plan.camera,
-            "noise": plan.noise,
-        },
-        **world_card(plan.suite, player.episode_config, plan.seed),
-        "made_with": provenance(),
-    }
+        before = command_of(read_run(arguments.resume), arguments.resume)
+        arguments = parser.parse_args([*before, *command])
+    arguments.out = arguments.resume
+    return arguments
 
 
 def main(command: Sequence[str] | None = None) -> int:
@@ -207,7 +177,14 @@ def main(command: Sequence[str] | None = None) -> int:
         os.environ.setdefault(variable, "1")
     command = sys.argv[1:] if command is None else command
     try:
-        return run(make_parser().parse_args(command), command)
+        if command and command[0] in SUBCOMMANDS:
+            module = importlib.import_module(f"mpgrasp.bench.{command[0]}")
+            code: int = module.main(command[1:])
+            return code
+        arguments = parse(command)
+        from mpgrasp.bench.run import run
+
+        return run(arguments, command)
     except MpgraspError as error:
         print("mpgrasp: error:", " ".join(str(error).splitlines()), file=sys.stderr)
         return EXIT_BAD_INPUT

@@ -39,8 +39,14 @@ def check_name(kind: str, name: str, known: Iterable[str]) -> None:
         raise ConfigError(f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class"])
 
 
-def load_detector(name: str, weights: Path | None = None) -> GraspDetector:
+def load_detector(name: str, weights: Path | None = None, runtime: str = "auto") -> GraspDetector:
     """A detector, ready to use.
+
+    Args:
+        name: in the registry, or an import path.
+        weights: file in place of the shipped one.
+        runtime: what computes a network of the registry: auto, torch or openvino; a plug-in's is its
+            own affair.
 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
@@ -53,7 +59,7 @@ def load_detector(name: str, weights: Path | None = None) -> GraspDetector:
         from mpgrasp.detectors import make_detector
 
         try:
-            detector: GraspDetector = make_detector(name, weights=weights)
+            detector: GraspDetector = make_detector(name, weights=weights, runtime=runtime)
         except MpgraspError:
             raise
         except Exception as error:  # a damaged file makes its reader fail in any way

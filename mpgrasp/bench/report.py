@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
@@ -18,16 +20,29 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from mpgrasp.bench.player import ERROR
+from mpgrasp.bench.statistics import SIGNIFICANCE
+
 PIPED_WIDTH = 160
 """Columns of a table that goes into a file or a pipe."""
 
 
 def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
-    """The table of a run from rows of `statistics.summarise`."""
+    """The table of a run from rows of `summary.summarise`."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
     for heading in ("suite", "detector", "controller"):
         table.add_column(heading, overflow="fold", vertical="top")
-    for heading in ("n", "success", "rate\n%", "95 %\ninterval", "median\ntime s", "reflex\nstops"):
+    errors = any(cell["errors"] for cell in cells)
+    headings = (
+        "n",
+        "success",
+        "rate\n%",
+        "95 %\ninterval",
+        "median\ntime s",
+        "mean time s\n(95 %)",
+        "reflex\nstops",
+    )
+    for heading in (*headings, *(["errors"] if errors else [])):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("failures")
     for cell in cells:
@@ -37,38 +52,74 @@ def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
             cell["controller"],
             str(cell["n"]),
             str(cell["successes"]),
-            f"{100 * cell['rate']:.1f}",
+            _number(cell["rate"] and 100 * cell["rate"]),
             f"{100 * cell['wilson_low']:.1f}-{100 * cell['wilson_high']:.1f}",
-            f"{cell['median_time_s']:.1f}",
+            _number(cell["median_time_s"]),
+            _with_interval(cell["mean_time_s"], cell["mean_time_low"], cell["mean_time_high"]),
             str(cell["reflex_stops"]),
+            *([str(cell["errors"])] if errors else []),
             # no blank within a cause, so that it is never torn apart
             " ".join(f"{outcome}:{count}" for outcome, count in cell["failures"].items()) or "none",
         )
     return table
 
 
+def _number(value: float | None) -> str:
+    return "-" if value is None or math.isnan(value) else f"{value:.1f}"
+
+
+def _with_interval(value: float, low: float, high: float) -> str:
+    bounds = "" if math.isnan(low) else f" ({low:.1f}-{high:.1f})"
+    return _number(value) + bounds
+
+
 def print_table(cells: Sequence[Mapping[str, Any]], console: Console | None = None) -> None:
     """Print the table of a run, wide enough for pipes and files too."""
+    wide_console(console).print(result_table(cells) if cells else "No episode was finished.")
+
+
+def print_tests(tests: Sequence[Mapping[str, Any]], console: Console | None = None) -> None:
+    """Print the paired tests of `summary.paired_tests` under the table, if there are any."""
+    if not tests:
+        return
+    table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
+    for heading in ("suite", "A", "B"):
+        table.add_column(heading, overflow="fold")
+    for heading in ("n", "A alone", "B alone", "McNemar p", "Holm p"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for test in tests:
+        table.add_row(
+            test["suite"],
+            " ".join(test["a"]),
+            " ".join(test["b"]),
+            str(test["n"]),
+            str(test["a_alone"]),
+            str(test["b_alone"]),
+            f"{test['p']:.3g}",
+            f"{test['p_holm']:.3g}" + (" *" if test["p_holm"] < SIGNIFICANCE else ""),
+        )
+    wide_console(console).print(table)
+
+
+def wide_console(console: Console | None = None) -> Console:
+    """A console (standard output if not given) that does not fold tables in pipes and files."""
     console = console or Console()
-    if not console.is_terminal:
-        console = Console(file=console.file, width=PIPED_WIDTH)
-    console.print(result_table(cells) if cells else "No episode was finished.")
+    return console if console.is_terminal else Console(file=console.file, width=PIPED_WIDTH)
 
 
 class ProgressReport:
     """A progress bar on a terminal, one line per episode elsewhere, nothing if quiet.
 
     Args:
-        total: number of episodes.
-        quiet: show nothing.
+        quiet: show nothing but notes.
         console: where to; standard error if not given.
     """
 
-    def __init__(self, total: int, *, quiet: bool = False, console: Console | None = None) -> None:
-        self._total = total
+    def __init__(self, *, quiet: bool = False, console: Console | None = None) -> None:
         self._quiet = quiet
         self._console = console or Console(stderr=True)
-        self._done = self._successes = 0
+        self._total = self._before = self._done = self._successes = 0
+        self._start = time.monotonic()
         self._bar: Progress | None = None
         if self._console.is_terminal and not quiet:
             self._bar = Progress(
@@ -80,7 +131,7 @@ class ProgressReport:
                 TimeRemainingColumn(),
                 console=self._console,
             )
-            self._task = self._bar.add_task("grasping", total=total, successes=0)
+            self._task = self._bar.add_task("grasping", total=None, successes=0)
 
     def __enter__(self) -> ProgressReport:
         if self._bar:
@@ -96,6 +147,27 @@ class ProgressReport:
         if self._bar:
             self._bar.stop()
 
+    def start(self, finished: Sequence[Mapping[str, Any]]) -> None:
+        """These episodes were finished in an earlier part of the run; the clock starts now."""
+        played = [line for line in finished if line["outcome"] != ERROR]
+        self._before = self._done = len(played)
+        self._successes = sum(bool(line["success"]) for line in played)
+        self._start = time.monotonic()
+        if self._bar:
+            self._bar.reset(self._task, completed=self._done, successes=self._successes)
+        elif played:
+            self.note(f"{len(played)} episodes are there already")
+
+    def expect(self, total: int) -> None:
+        """There will be so many episodes in all."""
+        self._total = total
+        if self._bar:
+            self._bar.update(self._task, total=total)
+
+    def note(self, text: str) -> None:
+        """Say something out of the ordinary, even if quiet."""
+        self._console.out(f"mpgrasp: {' '.join(text.split())}", highlight=False)
+
     def add(self, line: Mapping[str, Any]) -> None:
         """One more episode is finished."""
         self._done += 1
@@ -103,10 +175,17 @@ class ProgressReport:
         if self._bar:
             cell = f"{line['suite']} {line['detector']} {line['controller']}"
             self._bar.update(self._task, description=cell, completed=self._done, successes=self._successes)
-        elif not self._quiet:
+        if line["outcome"] == ERROR:
+            self.note(f"error: {line['error']}")
+        elif not self._bar and not self._quiet:
             text = (
-                f"[{self._done}/{self._total}] {line['suite']} episode {line['episode']}, "
-                f"{line['detector']}, {line['controller']}, {line['object']}: "
+                f"[{self._done}/{self._total}, {self._time_left()}] {line['suite']} "
+                f"episode {line['episode']}, {line['detector']}, {line['controller']}, {line['object']}: "
                 f"{line['outcome']} in {line['sim_time_s']:.1f} s"
             )
             self._console.out(text, highlight=False)
+
+    def _time_left(self) -> str:
+        pace = (time.monotonic() - self._start) / (self._done - self._before)
+        left = round(pace * (self._total - self._done))
+        return f"{left // 60}:{left % 60:02d} left"

@@ -1,26 +1,34 @@
-"""The folder of one run: run.json, episodes.jsonl, summary.json, recordings/.
+"""The folder of one run: run.json, episodes.jsonl, summary.json, errors/, recordings/.
 
-A line of episodes.jsonl is on the disk before the next episode begins, whatever happens then.
+A line of episodes.jsonl is on the disk as soon as its episode is finished, and whole or absent whatever
+happens then. While a run lasts, lines stand in the order in which they were finished; when it ends, they
+are put into the order of the plan.
 """
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from mpgrasp.bench.plan import EpisodeKey
+from mpgrasp.bench.player import ERROR, Line
+from mpgrasp.bench.run_files import EPISODES, RUN, read_lines, read_run
 from mpgrasp.exceptions import OutputError
 from mpgrasp.plain import difference, one_line, plain
 
 
 class RunDirectory:
-    """Writes a run; made with `RunDirectory.create`."""
+    """Writes a run; made with `RunDirectory.create` or `RunDirectory.resume`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.recordings = path / "recordings"
+        self._lock: int | None = None
         self._episodes: int | None = None
 
     @classmethod
@@ -39,98 +47,187 @@ class RunDirectory:
         """
         new = cls(path)
         content = plain(run)
-        try:
+        with new._taking_over():
             path.mkdir(parents=True, exist_ok=True)
+            new._claim()
             new._refuse_other_run(content["configuration"])
-            new._write("run.json", content)
-            new.recordings.mkdir(exist_ok=True)
+            new._write(RUN, content)
             if new.episodes_file.exists():
                 os.replace(new.episodes_file, path / "episodes.previous.jsonl")
             (path / "summary.json").unlink(missing_ok=True)
-            new._episodes = os.open(new.episodes_file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        except OSError as error:
-            raise _not_writable(path, error) from error
+            new._open()
+        return new
+
+    @classmethod
+    def resume(cls, path: Path, run: Mapping[str, Any], note: Callable[[str], None]) -> RunDirectory:
+        """The folder of a run that was interrupted, to be finished.
+
+        A last line that is not whole is cut off. run.json gets an entry in `resumed`, with what the rest
+        is made with where that has changed.
+
+        Args:
+            path: the folder.
+            run: what run.json would say of a new run.
+            note: is told in words what was repaired and what has changed.
+
+        Raises:
+            OutputError: no run to finish, one with another configuration, or a folder that cannot be
+                written.
+        """
+        new = cls(path)
+        content, before = plain(run), read_run(path)
+        found = difference(before["configuration"], content["configuration"])
+        if found:
+            raise OutputError(
+                f"cannot resume with another configuration ({found})",
+                got=str(path),
+                allowed="the configuration that the run began with, or another directory",
+            )
+        entry: dict[str, Any] = {"started": content.get("started")}
+        changed = difference(before.get("made_with"), content.get("made_with"))
+        if changed:
+            note(f"not made with the same as the finished episodes ({changed})")
+            entry["made_with"] = content["made_with"]
+        with new._taking_over():
+            new._claim()
+            if new.episodes_file.exists():
+                new._repair(note)
+            new._write(RUN, {**before, "resumed": [*before.get("resumed", []), entry]})
+            new._open()
         return new
 
     @property
     def episodes_file(self) -> Path:
         """One line of JSON per episode."""
-        return self.path / "episodes.jsonl"
+        return self.path / EPISODES
 
-    def append(self, line: Mapping[str, Any]) -> None:
+    def append(self, line: Mapping[str, Any], stem: str = "episode") -> None:
         """Add one episode: in a single write, and on the disk on return.
+
+        Args:
+            line: what to add; the traceback of an error goes to a file of its own in errors/, and the
+                line says to which.
+            stem: name of that file.
 
         Raises:
             OutputError: the disk is full or gone. What was there before stays whole.
         """
         assert self._episodes is not None
-        data = one_line(line).encode()
         try:
+            if line.get("outcome") == ERROR:
+                trace = Path("errors") / f"{stem}.txt"
+                (self.path / trace).parent.mkdir(exist_ok=True)
+                (self.path / trace).write_text(str(line["traceback"]), encoding="utf-8")
+                line = {**line, "traceback": str(trace)}
+            data = one_line(line).encode()
             size = os.fstat(self._episodes).st_size
-            if os.write(self._episodes, data) < len(data):
-                os.ftruncate(self._episodes, size)
-                raise OSError("disk full")
-            os.fsync(self._episodes)
+            try:
+                if os.write(self._episodes, data) < len(data):
+                    raise OSError("disk full")
+                os.fsync(self._episodes)
+            except OSError:
+                with suppress(OSError):
+                    os.ftruncate(self._episodes, size)
+                raise
         except OSError as error:
             raise _not_writable(self.episodes_file, error) from error
 
-    def episodes(self) -> list[dict[str, Any]]:
-        """All lines so far.
+    def episodes(self) -> list[Line]:
+        """One line per episode so far, in the order of the file; a result counts more than an error.
 
         Raises:
             OutputError: a line that is not JSON.
         """
-        lines = []
-        for number, text in enumerate(self.episodes_file.read_text(encoding="utf-8").splitlines(), 1):
-            try:
-                lines.append(json.loads(text))
-            except ValueError as error:
-                raise OutputError(
-                    f"{self.episodes_file}, line {number} is not JSON", got=text[:60]
-                ) from error
+        lines: dict[EpisodeKey, Line] = {}
+        for line in read_lines(self.path).lines:
+            key = EpisodeKey(*(line[name] for name in EpisodeKey._fields))
+            if key not in lines or line.get("outcome") != ERROR:
+                lines[key] = line
+        return list(lines.values())
+
+    def settle(self, order: Iterable[EpisodeKey]) -> list[Line]:
+        """Put the lines into an order, one per episode, and return them; those left over come last.
+
+        Raises:
+            OutputError: the file cannot be written anew; the old one stays as it is.
+        """
+        rank = {key: k for k, key in enumerate(order)}
+        lines = self.episodes()
+        lines.sort(key=lambda line: rank.get(EpisodeKey(*(line[n] for n in EpisodeKey._fields)), len(rank)))
+        try:
+            self._replace(EPISODES, "".join(one_line(line) for line in lines))
+        except OSError as error:
+            raise _not_writable(self.episodes_file, error) from error
+        self._close_episodes()  # it is the old file's
         return lines
 
-    def write_summary(self, cells: Sequence[Mapping[str, Any]], *, complete: bool) -> None:
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write summary.json.
-
-        Args:
-            cells: rows of `statistics.summarise`.
-            complete: whether all planned episodes are in.
 
         Raises:
             OutputError: the file cannot be written.
         """
         try:
-            self._write("summary.json", {"complete": complete, "cells": plain(list(cells))})
+            self._write("summary.json", plain(summary))
         except OSError as error:
             raise _not_writable(self.path / "summary.json", error) from error
 
-    def write_text(self, name: str, text: str) -> Path:
-        """Write a text file into the folder.
-
-        Raises:
-            OutputError: the file cannot be written.
-        """
-        try:
-            (self.path / name).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise _not_writable(self.path / name, error) from error
-        return self.path / name
-
     def close(self) -> None:
-        """Close episodes.jsonl."""
+        """Let go of the folder."""
+        self._close_episodes()
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    @contextmanager
+    def _taking_over(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.close()
+            raise _not_writable(self.path, error) from error
+        except OutputError:
+            self.close()
+            raise
+
+    def _claim(self) -> None:
+        """Keep other processes from writing here; the claim ends with this process at the latest."""
+        self._lock = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise OutputError(
+                "another process is writing to this directory", got=str(self.path), allowed="one at a time"
+            ) from error
+        except OSError:
+            pass  # a file system without locks
+
+    def _open(self) -> None:
+        self.recordings.mkdir(exist_ok=True)
+        self._episodes = os.open(self.episodes_file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+
+    def _close_episodes(self) -> None:
         if self._episodes is not None:
             os.close(self._episodes)
             self._episodes = None
 
+    def _repair(self, note: Callable[[str], None]) -> None:
+        found = read_lines(self.path)
+        if found.torn is None:
+            return
+        with self.episodes_file.open("r+b") as file:
+            file.truncate(found.whole)
+            os.fsync(file.fileno())
+        note(
+            f"the last line of {self.episodes_file} was not whole ({found.torn[:40]!r}...) and is cut off; "
+            f"its episode is played again"
+        )
+
     def _refuse_other_run(self, configuration: Any) -> None:
-        file = self.path / "run.json"
-        if file.exists():
+        if (self.path / RUN).exists():
             try:
-                found = difference(
-                    json.loads(file.read_text(encoding="utf-8"))["configuration"], configuration
-                )
-            except (ValueError, KeyError, TypeError):
+                found = difference(read_run(self.path)["configuration"], configuration)
+            except OutputError:
                 found = "its run.json cannot be read"
         elif self.episodes_file.exists():
             found = "episodes.jsonl without a run.json"
@@ -144,10 +241,21 @@ class RunDirectory:
             )
 
     def _write(self, name: str, content: Any) -> None:
-        """Replace a JSON file as a whole, so that there is never half of one."""
+        self._replace(name, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+    def _replace(self, name: str, text: str) -> None:
+        """Replace a file as a whole, so that there is never half of one."""
         temporary = self.path / f".{name}.tmp"
-        temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(temporary, self.path / name)
+        try:
+            with temporary.open("w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, self.path / name)
+        except OSError:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise
 
 
 def _not_writable(path: Path, error: OSError) -> OutputError:

@@ -1,0 +1,92 @@
+"""Two sets of episodes over the same worlds: who succeeded where, and whether that is chance."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mpgrasp.bench.player import ERROR
+from mpgrasp.bench.statistics import mcnemar, mean_interval
+from mpgrasp.exceptions import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pairing:
+    """What two sets of episodes have in common."""
+
+    n: int
+    """Worlds that both met."""
+    both: int
+    """Worlds in which both succeeded."""
+    a_alone: int
+    b_alone: int
+    same_outcome: int
+    """Worlds in which both ended the same way."""
+    identical: int
+    """Worlds that both left in the same state, bit by bit."""
+    p: float
+    """Two-sided, of McNemar's exact test."""
+    time_difference_s: float
+    """Mean of B's simulated time minus A's where both succeeded [s]."""
+    time_low: float
+    time_high: float
+
+    @property
+    def rate_a(self) -> float:
+        """A's success rate over the common worlds; NaN where there are none."""
+        return (self.both + self.a_alone) / self.n if self.n else np.nan
+
+    @property
+    def rate_b(self) -> float:
+        """B's success rate over the common worlds; NaN where there are none."""
+        return (self.both + self.b_alone) / self.n if self.n else np.nan
+
+
+def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pairing:
+    """Pair the lines of two cells by suite, seed and episode; error rows count for neither.
+
+    Raises:
+        ConfigError: the same episode had another scene in the other run, or occurs twice.
+    """
+    ours, theirs = _by_world(a), _by_world(b)
+    pairs = [(ours[key], theirs[key]) for key in ours if key in theirs]
+    for one, other in pairs:
+        if one["scene_seed"] != other["scene_seed"]:
+            raise ConfigError(
+                f"episode {one['episode']} of {one['suite']} had another scene in the other run",
+                got=(one["scene_seed"], other["scene_seed"]),
+                allowed="the same scene_seed",
+            )
+    wins = [(bool(one["success"]), bool(other["success"])) for one, other in pairs]
+    times = [
+        other["sim_time_s"] - one["sim_time_s"] for one, other in pairs if one["success"] and other["success"]
+    ]
+    difference, low, high = mean_interval(times)
+    a_alone, b_alone = wins.count((True, False)), wins.count((False, True))
+    return Pairing(
+        n=len(pairs),
+        both=wins.count((True, True)),
+        a_alone=a_alone,
+        b_alone=b_alone,
+        same_outcome=sum(one["outcome"] == other["outcome"] for one, other in pairs),
+        identical=sum(one["state_hash"] == other["state_hash"] for one, other in pairs),
+        p=mcnemar(a_alone, b_alone),
+        time_difference_s=difference,
+        time_low=low,
+        time_high=high,
+    )
+
+
+def _by_world(lines: Iterable[Mapping[str, Any]]) -> dict[Hashable, Mapping[str, Any]]:
+    worlds: dict[Hashable, Mapping[str, Any]] = {}
+    for line in lines:
+        key = (line["suite"], line["seed"], line["episode"])
+        if line["outcome"] == ERROR:
+            continue
+        if key in worlds:
+            raise ConfigError("an episode occurs twice in one cell", got=key, allowed="one line each")
+        worlds[key] = line
+    return worlds

@@ -1,0 +1,113 @@
+"""Plays one episode of a plan at a time and says in a line what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mpgrasp.bench.plan import Plan, Task
+from mpgrasp.bench.plugins import load_controller, load_detector
+from mpgrasp.bench.suite import episode_seed
+from mpgrasp.exceptions import MpgraspError, OutputError
+from mpgrasp.recording import NullRecorder, Recorder
+
+Line = dict[str, Any]
+"""One line of episodes.jsonl."""
+
+RunEpisode = Callable[..., Any]
+"""Called like `mpgrasp.episode.run_episode`; returns what has `as_record()`."""
+
+ERROR = "error"
+"""`outcome` of an episode that could not be played: no failure of a grasp, and counted apart."""
+
+
+class EpisodeError(MpgraspError):
+    """An episode that could not be played to its end, by a fault in a detector, controller or mpgrasp."""
+
+
+class Player:
+    """Plays episodes one at a time with detectors and controllers that are made once.
+
+    Raises:
+        ConfigError, WeightsError: a detector, controller or setting that cannot be used.
+    """
+
+    def __init__(self, plan: Plan, run_episode: RunEpisode | None = None) -> None:
+        self.plan = plan
+        self.detectors = {
+            name: load_detector(name, plan.weights.get(name), plan.runtime) for name in plan.detectors
+        }
+        self.controllers = {name: load_controller(name) for name in plan.controllers}
+        self.episode_config = plan.suite.episode_config(camera=plan.camera, noise=plan.noise)
+        self._run_episode = run_episode or real_run_episode()
+
+    def play(self, task: Task) -> Line:
+        """The line of one episode, to go to episodes.jsonl.
+
+        Raises:
+            OutputError: its recording cannot be written.
+            EpisodeError: something else went wrong on the way; it is the cause.
+        """
+        suite = self.plan.suite
+        try:
+            result = self._run_episode(
+                suite.scene_config(task.episode),
+                episode_seed(suite.name, self.plan.seed, task.episode),
+                detector=self.detectors[task.detector],
+                controller=self.controllers[task.controller],
+                config=self.episode_config,
+                recorder=self._recorder(task),
+            )
+            record = result.as_record()
+        except OutputError:
+            raise
+        except Exception as error:
+            raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
+        return {**record, **_which(self.plan, task)}
+
+    def _recorder(self, task: Task) -> Recorder:
+        if self.plan.recordings is None or task.episode >= self.plan.record:
+            return NullRecorder()
+        from mpgrasp.film import FilmConfig, FilmRecorder
+        from mpgrasp.recording import TeeRecorder
+        from mpgrasp.rerun_recorder import RerunRecorder
+
+        stem = self.plan.recordings / task.stem
+        film = FilmRecorder(f"{stem}.gif", config=FilmConfig(backend=self.plan.camera))
+        return TeeRecorder(RerunRecorder(f"{stem}.rrd"), film)
+
+
+def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> Line:
+    """The line of an episode that could not be played.
+
+    Args:
+        plan: that it belongs to.
+        task: which episode it is.
+        troubles: one (what went wrong, traceback) per attempt.
+    """
+    reports = [f"attempt {k}: {what}\n\n{trace}" for k, (what, trace) in enumerate(troubles, 1)]
+    return {
+        "outcome": ERROR,
+        "success": None,
+        "error": troubles[-1][0],
+        "traceback": "\n".join(reports),
+        **_which(plan, task),
+    }
+
+
+def real_run_episode() -> RunEpisode:
+    """The function that plays real episodes; loads MuJoCo."""
+    from mpgrasp.episode import run_episode
+
+    return run_episode
+
+
+def _which(plan: Plan, task: Task) -> Line:
+    return {
+        "suite": plan.suite.name,
+        "seed": plan.seed,
+        "scene_seed": episode_seed(plan.suite.name, plan.seed, task.episode),
+        "episode": task.episode,
+        "detector": task.detector,
+        "controller": task.controller,
+    }

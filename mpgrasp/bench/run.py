@@ -1,0 +1,177 @@
+"""Plays a run from its plan to its table: batches, resumption, interruption."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from mpgrasp.bench.description import describe
+from mpgrasp.bench.interrupts import interrupts_wait
+from mpgrasp.bench.plan import EpisodeKey, Plan
+from mpgrasp.bench.player import ERROR, EpisodeError, Line, Player
+from mpgrasp.bench.plugins import check_name, controller_names, detector_names, parse_weights
+from mpgrasp.bench.report import ProgressReport, print_table, print_tests
+from mpgrasp.bench.run_directory import RunDirectory
+from mpgrasp.bench.runner import Crew, make_crew
+from mpgrasp.bench.suite import load_suite
+from mpgrasp.bench.summary import paired_tests, summarise
+from mpgrasp.exceptions import ConfigError, OutputError
+
+EXIT_BROKEN, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+
+def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
+    """The plan of a command line and the folder of its results.
+
+    Raises:
+        ConfigError: input that cannot be used.
+    """
+    detectors, controllers = (tuple(names.split(",")) for names in (arguments.detector, arguments.controller))
+    for name in detectors:
+        check_name("detector", name, detector_names())
+    for name in controllers:
+        check_name("controller", name, controller_names())
+    suite = load_suite(arguments.suite)
+    out = arguments.out or Path("runs") / f"{suite.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    plan = Plan(
+        suite=suite,
+        detectors=detectors,
+        controllers=controllers,
+        weights=parse_weights(arguments.weights, detectors),
+        runtime=arguments.runtime,
+        episodes=arguments.episodes,
+        until_ci=arguments.until_ci,
+        max_episodes=arguments.max_episodes,
+        seed=arguments.seed,
+        camera=arguments.camera,
+        noise=not arguments.no_noise,
+        record=arguments.record,
+        recordings=out / "recordings",
+    )
+    return plan, out
+
+
+def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
+    """Play what the command line asks for.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        MpgraspError: input that cannot be used.
+    """
+    if arguments.workers < 0:
+        raise ConfigError("workers out of range", got=arguments.workers, allowed="0 or more")
+    plan, out = make_plan(arguments)
+    player = Player(plan)  # whatever is wrong with a detector or controller shows before the first episode
+    content = describe(plan, player, command)
+    with ProgressReport(quiet=arguments.quiet) as progress:
+        if arguments.resume:
+            directory = RunDirectory.resume(out, content, progress.note)
+        else:
+            directory = RunDirectory.create(out, content)
+        # where there are workers, each has detectors of its own: these here would only take up memory
+        here = None if arguments.workers else player
+        del player
+        code, finished = 0, False
+        try:
+            crew = make_crew(plan, arguments.workers, player=here, hang_after=arguments.hang_after)
+            try:
+                finished = _play_batches(plan, directory, crew, progress)
+            finally:
+                crew.close()
+        except KeyboardInterrupt:
+            progress.note("interrupted; the finished episodes are kept")
+            code = EXIT_INTERRUPTED
+        except EpisodeError as error:
+            progress.note(f"error: {error}")
+            code = EXIT_BROKEN
+        except OutputError as error:
+            progress.note(f"error: {error}; the finished episodes are kept")
+            code = EXIT_BAD_INPUT
+    with interrupts_wait():
+        return _conclude(plan, directory, finished) or code
+
+
+def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: ProgressReport) -> bool:
+    """Play what is missing; True once nothing is.
+
+    Batches are fixed, and whether another follows depends on the lines of the batches before alone: not
+    on the number of workers, nor on where a run was interrupted.
+    """
+    before = directory.episodes()
+    progress.start(before)
+    played = {key_of(line) for line in before if line["outcome"] != ERROR}
+    stems: dict[EpisodeKey, str] = {}
+
+    def sink(line: Line) -> None:
+        with interrupts_wait():
+            directory.append(line, stems[key_of(line)])
+            progress.add(line)
+
+    stop = 0
+    while True:
+        start, stop = stop, stop + plan.episodes
+        if plan.until_ci is not None:
+            stop = min(stop, plan.max_episodes)
+        tasks = plan.tasks(start, stop)
+        stems = {plan.key(task): task.stem for task in tasks}
+        progress.expect(len(plan.tasks(0, stop)))
+        crew.play([task for task in tasks if plan.key(task) not in played], sink, progress.note)
+        if plan.until_ci is None or _narrow(plan, directory.episodes(), stop):
+            return True
+        if stop == plan.max_episodes:
+            progress.note(
+                f"{plan.max_episodes} episodes of each combination have not brought every interval below "
+                f"{plan.until_ci:g} points; --max-episodes allows more"
+            )
+            return True
+
+
+def _narrow(plan: Plan, lines: Sequence[Line], stop: int) -> bool:
+    """Whether the first `stop` episodes leave no cell's interval as wide as `until_ci`."""
+    assert plan.until_ci is not None
+    cells = summarise(line for line in lines if line["episode"] < stop)
+    widths = [100 * (cell["wilson_high"] - cell["wilson_low"]) for cell in cells]
+    everyone = len(plan.detectors) * len(plan.controllers)
+    return len(widths) == everyone and max(widths) < plan.until_ci
+
+
+def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
+    """Put the lines in order, write and print what they add up to; the exit code that follows from it."""
+    code = 0
+    lines = directory.episodes()
+    order = [
+        plan.key(task) for task in plan.tasks(0, 1 + max((line["episode"] for line in lines), default=-1))
+    ]
+    rank = {key: k for k, key in enumerate(order)}
+    lines.sort(key=lambda line: rank.get(key_of(line), len(rank)))
+    cells, tests = summarise(lines), paired_tests(lines)
+    errors = sum(cell["errors"] for cell in cells)
+    try:
+        directory.settle(order)
+        directory.write_summary({"complete": finished and not errors, "cells": cells, "paired_tests": tests})
+    except OutputError as error:
+        print(f"mpgrasp: error: {error}", file=sys.stderr)
+        code = EXIT_BAD_INPUT
+    finally:
+        directory.close()
+    print_table(cells)
+    print_tests(tests)
+    print(f"Results: {directory.path}")
+    if errors:
+        print(
+            f"mpgrasp: {errors} episodes could not be played, see {directory.path / 'errors'}; "
+            f"--resume {directory.path} tries them again",
+            file=sys.stderr,
+        )
+        code = code or EXIT_BROKEN
+    return code
+
+
+def key_of(line: Line) -> EpisodeKey:
+    """Which episode a line is about."""
+    return EpisodeKey(*(line[name] for name in EpisodeKey._fields))

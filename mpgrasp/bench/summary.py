@@ -1,0 +1,109 @@
+"""What a set of episodes adds up to: one row per cell, and a paired test for every two cells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from itertools import combinations
+from statistics import median
+from typing import Any
+
+from mpgrasp.bench.pairing import pair
+from mpgrasp.bench.player import ERROR
+from mpgrasp.bench.statistics import holm, mean_interval, restricted, wilson_interval
+
+MOTION = (
+    "min_singular_value", "near_singularity_s", "path_length_m", "jerk_rms", "spectral_arc_length",
+    "first_detection_s", "blind_drift_m",
+)  # fmt: skip
+"""Keys of a line that say how the arm moved; a cell gives their medians over the lines that have them."""
+
+Cells = dict[tuple[str, str, str], list[Mapping[str, Any]]]
+
+
+def by_cell(episodes: Iterable[Mapping[str, Any]]) -> Cells:
+    """Lines by (suite, detector, controller), in order of first appearance."""
+    cells: Cells = {}
+    for line in episodes:
+        cells.setdefault((line["suite"], line["detector"], line["controller"]), []).append(line)
+    return cells
+
+
+def summarise(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """One JSON-ready row per cell (suite, detector, controller), in order of first appearance.
+
+    Keys: suite, detector, controller; n (error rows do not count), errors, successes, rate, wilson_low,
+    wilson_high; median_time_s; mean_time_s, mean_time_low, mean_time_high and time_limit_s (of the
+    restricted mean where an episode of the suite hit its limit, else None); reflex_stops, reflexes
+    {limit: count}, failures {outcome: count}, objects {name: {n, successes}}, motion {key: median} and
+    worst_singular_value.
+    """
+    cells = by_cell(episodes)
+    limits = {
+        suite: min(
+            (line["sim_time_s"] for (name, _, _), lines in cells.items() if name == suite for line in lines
+             if line["outcome"] == "timeout"),
+            default=None,
+        )
+        for suite, _, _ in cells
+    }  # fmt: skip
+    return [_cell(*key, lines, limits[key[0]]) for key, lines in cells.items()]
+
+
+def _cell(
+    suite: str, detector: str, controller: str, lines: list[Mapping[str, Any]], limit: float | None
+) -> dict[str, Any]:
+    played = [line for line in lines if line["outcome"] != ERROR]
+    n, successes = len(played), sum(bool(line["success"]) for line in played)
+    low, high = wilson_interval(successes, n)
+    times = [line["sim_time_s"] for line in played]
+    mean, mean_low, mean_high = mean_interval(restricted(times, limit))
+    objects: dict[str, dict[str, int]] = {}
+    for line in played:
+        counts = objects.setdefault(str(line["object"]), {"n": 0, "successes": 0})
+        counts["n"] += 1
+        counts["successes"] += bool(line["success"])
+    values = {key: [line[key] for line in played if line.get(key) is not None] for key in MOTION}
+    reflexes = [line["reflex"]["limit"] for line in played if line["reflex"] is not None]
+    return {
+        "suite": suite,
+        "detector": detector,
+        "controller": controller,
+        "n": n,
+        "errors": len(lines) - n,
+        "successes": successes,
+        "rate": successes / n if n else None,
+        "wilson_low": low,
+        "wilson_high": high,
+        "median_time_s": median(times) if times else None,
+        "mean_time_s": mean,
+        "mean_time_low": mean_low,
+        "mean_time_high": mean_high,
+        "time_limit_s": limit,
+        "reflex_stops": len(reflexes),
+        "reflexes": dict(sorted(Counter(reflexes).items())),
+        "failures": dict(sorted(Counter(line["outcome"] for line in played if not line["success"]).items())),
+        "objects": dict(sorted(objects.items())),
+        "motion": {key: median(numbers) for key, numbers in values.items() if numbers},
+        "worst_singular_value": min(values["min_singular_value"], default=None),
+    }
+
+
+def paired_tests(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """One JSON-ready row per two cells of a suite over the worlds that both met.
+
+    Keys: suite, a and b as [detector, controller], n, both, a_alone, b_alone, p (McNemar, exact,
+    two-sided) and p_holm, corrected over all rows.
+    """
+    rows: list[dict[str, Any]] = []
+    for (key_a, lines_a), (key_b, lines_b) in combinations(by_cell(episodes).items(), 2):
+        if key_a[0] != key_b[0]:
+            continue
+        found = pair(lines_a, lines_b)
+        rows.append(
+            {"suite": key_a[0], "a": list(key_a[1:]), "b": list(key_b[1:]), "n": found.n}
+            | {name: getattr(found, name) for name in ("both", "a_alone", "b_alone", "p")}
+        )
+    for row, p in zip(rows, holm([row["p"] for row in rows]), strict=True):
+        row["p_holm"] = p
+    return rows

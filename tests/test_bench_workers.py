@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import fakes
+import pytest
+from test_bench_runner import lines_of, make_plan, without_timing
+
+from mpgrasp.bench import workers
+from mpgrasp.bench.player import EpisodeError
+from mpgrasp.bench.runner import play_all
+
+CRASHES = {
+    1: ("ended with exit code 9", "no traceback"),
+    2: ("was killed by SIGKILL", "no traceback"),
+    3: ("was killed by SIGSEGV", "in crashes"),
+}
+
+
+def played(
+    run_episode: Any, *, hang_after: float = 60.0, count: int = 1, episodes: int = 3
+) -> tuple[list[dict], list[str]]:
+    """Lines in the order of the episodes, and the notes."""
+    lines: list[dict] = []
+    notes: list[str] = []
+    plan = make_plan(episodes=episodes)
+    play_all(
+        plan, lines.append, workers=count, run_episode=run_episode, hang_after=hang_after, note=notes.append
+    )
+    return sorted(lines, key=lambda line: line["episode"]), notes
+
+
+def test_a_crash_costs_one_retry_and_then_its_episode_alone() -> None:
+    lines, notes = played(fakes.crashes, count=2, episodes=5)
+    assert [line["outcome"] == "error" for line in lines] == [False, True, True, True, False]
+    for episode, (how, trace) in CRASHES.items():
+        broken = lines[episode]
+        assert broken["success"] is None
+        assert how in broken["error"]
+        assert broken["traceback"].count("attempt") == 2
+        assert trace in broken["traceback"]
+        (note,) = [text for text in notes if f"episode {episode} " in text]
+        assert "played again" in note
+    undisturbed = lines_of(make_plan(episodes=5))
+    assert without_timing([lines[0], lines[4]]) == without_timing([undisturbed[0], undisturbed[4]])
+
+
+def test_a_hang_ends_after_its_time_and_shows_where_it_was() -> None:
+    clock = time.monotonic()
+    lines, _ = played(fakes.hangs, hang_after=0.3, count=2)
+    assert time.monotonic() - clock < 30
+    assert [line["outcome"] == "error" for line in lines] == [False, True, False]
+    assert "hung: no answer within 0.3 s" in lines[1]["error"]
+    assert "in hangs" in lines[1]["traceback"]
+
+
+def test_an_episode_that_succeeds_at_the_second_attempt_is_as_if_nothing_had_happened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MPGRASP_TEST_MARK", str(tmp_path / "mark"))
+    lines, notes = played(fakes.dies_once)
+    assert without_timing(lines) == without_timing(lines_of(make_plan(episodes=3)))
+    assert len(notes) == 1
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_an_exception_is_an_error_row_with_its_traceback(count: int) -> None:
+    lines, notes = played(fakes.breaks_off, count=count)
+    assert [line["outcome"] == "error" for line in lines] == [False, True, True]
+    assert "ZeroDivisionError: a bug in a detector" in lines[1]["error"]
+    assert "fakes.py" in lines[1]["traceback"]
+    assert len(notes) == 2
+
+
+def test_workers_that_cannot_start_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "_work", fakes.ends_at_once)
+    with pytest.raises(EpisodeError, match=r"die while they start.*exit code 3"):
+        played(fakes.run_episode)
