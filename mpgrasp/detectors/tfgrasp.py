@@ -28,6 +28,8 @@ MASKED = -1e4
 """Added to scores of tokens that must not see each other; their softmax is zero, not a slow denormal."""
 LINEAR_STD = 0.02
 """Spread of first weights of linear layers and position biases."""
+HEAD_STD = 0.02
+"""Of the heads' initial weights."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,17 +99,22 @@ class TFGrasp(nn.Module):
                 if module.bias is not None:
                     nn.init.zeros_(module.bias)
         for name in HEADS:
-            self.add_module(f"{name}_output", nn.Conv2d(c.embed, 1, 1, bias=False))
+            head = nn.Conv2d(c.embed, 1, 1, bias=False)
+            # pixels leave the last norm at unit size: larger heads fill the background with noise, and for
+            # hundreds of steps all gradients are spent on silencing it
+            nn.init.normal_(head.weight, std=HEAD_STD)
+            self.add_module(f"{name}_output", head)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        tokens = self.patch_norm(self.patches(x).permute(0, 2, 3, 1))  # (n, size/4, size/4, embed)
+        # tokens stay in single precision under autocast: what blocks add is small beside what is there
+        tokens = self.patch_norm(self.patches(x).permute(0, 2, 3, 1).float())  # (n, size/4, size/4, embed)
         skips: list[Tensor] = []
         for stage, merge in zip(self.encoder, self.merge, strict=False):
             skips.append(tokens)
-            tokens = merge(stage(tokens))
+            tokens = merge(stage(tokens)).float()
         tokens = self.norm(self.encoder[-1](tokens))
         for k in reversed(range(len(skips))):
-            tokens = self.reduce[k](torch.cat([self.expand[k](tokens), skips[k]], dim=-1))
+            tokens = self.reduce[k](torch.cat([self.expand[k](tokens), skips[k]], dim=-1)).float()
             tokens = self.decoder[k](tokens)
         pixels = self.pixels.parts(self.decoder_norm(tokens))  # (n, size/4, size/4, 4, 4, embed)
         # the four 1x1 convolutions as one, before the pixels are put in their places: four channels to move
