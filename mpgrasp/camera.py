@@ -181,6 +181,15 @@ def _require_colour(backend: str) -> None:
     require_gl()
 
 
+def has_colour(backend: str) -> bool:
+    """Whether a camera of that backend can see colour here: only OpenGL renders it.
+
+    Raises:
+        CameraError: backend "gl" without GL.
+    """
+    return backend != "ray" and _gl_usable(backend)
+
+
 def _gl_usable(backend: str) -> bool:
     """Whether GL works here; under "gl" it must, under "auto" the log says once that it does not."""
     if backend == "gl":

@@ -10,19 +10,17 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from mpgrasp.camera import BACKENDS, WristCamera
+from mpgrasp.camera import WristCamera
 from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
+from mpgrasp.episode_config import EpisodeConfig
 from mpgrasp.episode_metrics import ReachMetrics
 from mpgrasp.episode_result import EpisodeResult, Outcome
-from mpgrasp.exceptions import ConfigError
 from mpgrasp.execution import execute_grasp
-from mpgrasp.execution_config import ExecutionConfig
 from mpgrasp.geometry import FloatArray, invert, looking_down
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.ik import solve_pose
@@ -40,38 +38,6 @@ _NOISE_STREAM = 11
 _START_STREAM = 12
 _CONTROLLER_STREAM = 13
 _TICK_PERIOD = 0.1  # [s], between two records of a recording once the reach is over
-
-
-@dataclass(frozen=True, kw_only=True)
-class EpisodeConfig:
-    """How an episode runs, whatever the detector and the controller."""
-
-    control_dt: float = 0.1
-    """Period of the control tick: image, detection, decision [s]."""
-    start_height: float = 0.50
-    """Height of the tool point over the table at the start [m], Table I's z_max."""
-    start_jitter: float = 0.05
-    """Standard deviation of the first viewpoint about the workspace's centre, in x and in y [m]; drawn
-    within two standard deviations."""
-    max_reach_time: float = 20.0
-    """A reach that takes longer is a timeout [s]."""
-    camera_backend: str = "auto"
-    """auto, gl or ray."""
-    camera_crop: int | None = 350
-    """Central square of the 640 x 480 image that is rendered [px]; None for the whole image."""
-    noise: bool = True
-    """Whether the depth camera is as noisy as a D435."""
-    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
-    """How the chosen grasp is executed and judged."""
-
-    def __post_init__(self) -> None:
-        for name in ("control_dt", "start_height", "max_reach_time"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
-        if self.start_jitter < 0:
-            raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
-        if self.camera_backend not in BACKENDS:
-            raise ConfigError("unknown camera backend", got=self.camera_backend, allowed=BACKENDS)
 
 
 def run_episode(
@@ -101,27 +67,34 @@ def run_episode(
     episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
     try:
         controller.reset(controller_seed(seed))
-        while episode.interruption() is None:
-            observation = episode.look()
-            with episode.timed("control"):
-                command = controller.update(observation)
-            episode.act(command, controller.diagnostics())
-            if command.done:
-                break
-        return episode.conclude(controller.final_grasp() if episode.interruption() is None else None)
+        return episode.conclude(reach(episode, controller))
     finally:
         episode.close()
 
 
-def controller_seed(seed: int) -> int:
-    """Seed that the controller of an episode is told; the scene cannot be built from it."""
-    return int(np.random.default_rng([seed, _CONTROLLER_STREAM]).integers(2**32))
+def reach(episode: Episode, controller: Controller) -> Grasp | None:
+    """Look and move under a controller until it is done: its grasp; None without one or if interrupted."""
+    while episode.interruption() is None:
+        observation = episode.look()
+        with episode.timed("control"):
+            command = controller.update(observation)
+        episode.act(command, controller.diagnostics())
+        if command.done:
+            break
+    return controller.final_grasp() if episode.interruption() is None else None
+
+
+def controller_seed(seed: int, attempt: int = 0) -> int:
+    """Seed that the controller of an episode's attempt is told; the scene cannot be built from it."""
+    stream = [seed, _CONTROLLER_STREAM, attempt] if attempt else [seed, _CONTROLLER_STREAM]
+    return int(np.random.default_rng(stream).integers(2**32))
 
 
 class Episode:
     """One attempt, taken tick by tick: look and act in turn, then conclude.
 
-    `run_episode` steps it with a controller, `mpgrasp.env` with whatever a learner decides.
+    `run_episode` steps it with a controller, `mpgrasp.env` with whatever a learner decides, and
+    `mpgrasp.clearing` takes several attempts in one world: `attempt` and `begin` in turn.
 
     Args:
         scene_config: what is on the table.
@@ -153,17 +126,24 @@ class Episode:
         )
         self.simulation.set_q(self._start_q())
         self.driver = ArmDriver(self.simulation)
-        self.start_time = self.simulation.time
-        self.metrics = ReachMetrics()
         self.ticks = 0
+        """Control ticks, of all attempts."""
         self.frame: DepthFrame | None = None
         """What the camera saw at the last look."""
         self._grasp_map: GraspMap | None = None
         self._times: dict[str, list[float]] = defaultdict(list)
         self._last_record = -np.inf
-        self._grasp: Grasp | None = None
         self.recorder.start(self.simulation)
-        detector.reset(self.scene.height_map() if reads_truth(detector) else None)
+        self.begin()
+
+    def begin(self) -> None:
+        """Start an attempt from where the arm rests: its clock, its metrics and the truth anew."""
+        self.driver.reset()
+        self.start_time, self._first_tick = self.simulation.time, self.ticks
+        self.metrics = ReachMetrics()
+        self._grasp: Grasp | None = None
+        truth = reads_truth(self.detector)
+        self.detector.reset(self.scene.height_map(data=self.simulation.data) if truth else None)
 
     def look(self) -> Observation:
         """The view of this tick. Its noise depends on seed and tick alone: looking twice shows the same."""
@@ -200,6 +180,12 @@ class Episode:
         return Outcome.TIMEOUT if late else None
 
     def conclude(self, grasp: Grasp | None) -> EpisodeResult:
+        """Execute the grasp, unless the reach was interrupted, judge, and end the recording."""
+        result = self.attempt(grasp)
+        self.recorder.finish(self._verdict(result.outcome))
+        return result
+
+    def attempt(self, grasp: Grasp | None) -> EpisodeResult:
         """Execute the grasp, unless the reach was interrupted, and judge."""
         reach = self.driver.statistics()
         outcome, lifted = self.interruption(), None
@@ -207,13 +193,19 @@ class Episode:
             outcome = Outcome.NO_GRASP
         elif outcome is None and grasp is not None:
             self._grasp = grasp
-            execution = execute_grasp(
-                self.driver, grasp, self.config.execution, on_tick=self._record_execution
-            )
+            execution = execute_grasp(self.driver, grasp, self.config.execution, on_tick=self.record_motion)
             outcome, lifted = Outcome(execution.outcome), execution.lifted
         assert outcome is not None
-        self.recorder.finish(self._verdict(outcome))
         return self._result(outcome, lifted, reach)
+
+    def record_motion(self, phase: str, driver: ArmDriver) -> None:
+        """Show the recorder a tick of a motion that is no reach, as often as one of a reach."""
+        if self.simulation.time - self._last_record >= _TICK_PERIOD - 1e-6:
+            self._record(phase, None, None, {})
+
+    def timing(self) -> dict[str, float]:
+        """Median wall time of each stage of a tick so far [ms]."""
+        return {stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES}
 
     def close(self) -> None:
         """Free the camera."""
@@ -242,7 +234,7 @@ class Episode:
             outcome=outcome,
             object=lifted or self._target(),
             sim_time_s=self.simulation.time - self.start_time,
-            ticks=self.ticks,
+            ticks=self.ticks - self._first_tick,
             reflex=self.driver.reflex,
             min_singular_value=whole.min_singular_value,
             near_singularity_s=whole.near_singularity,
@@ -252,7 +244,7 @@ class Episode:
             first_detection_s=self.metrics.first_detection_s,
             blind_drift_m=self.metrics.blind_drift_m,
             grasp=self._grasp,
-            timing={stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES},
+            timing=self.timing(),
             state_hash=self.simulation.state_hash(),
         )
 
@@ -268,10 +260,6 @@ class Episode:
 
     def _verdict(self, outcome: Outcome) -> str:
         return f"{outcome}: {self.driver.reflex}" if outcome is Outcome.REFLEX else str(outcome)
-
-    def _record_execution(self, phase: str, driver: ArmDriver) -> None:
-        if self.simulation.time - self._last_record >= _TICK_PERIOD - 1e-6:
-            self._record(phase, None, None, {})
 
     def _record(
         self,

@@ -58,7 +58,7 @@ class ExecutionConfig:
     shake_frequency: float = 3.0
     """[Hz]; with the amplitude, peaks of 1.8 m/s2."""
     shake_time: float = 0.7
-    """Of each of the two shakes, sideways and up and down [s]."""
+    """Of each of the two shakes, sideways and up and down [s]; 0 = not shaken."""
     settle_after_shake: float = 0.2
     """[s]"""
     success_height: float = 0.05
@@ -74,7 +74,6 @@ class ExecutionConfig:
             "entry_speed",
             "guarded_speed",
             "lift_speed",
-            "shake_time",
             "lift",
         ):
             if getattr(self, name) == 0:

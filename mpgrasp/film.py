@@ -37,7 +37,8 @@ _INK, _PAPER = (235, 235, 235), (24, 26, 30)
 _FOCAL = 1.15  # of the watching camera, in widths of its picture
 _SUN = np.array([0.35, -0.45, 0.82])
 _SKY = (40, 44, 52)
-_PERIOD = 0.1  # [s] of simulation between pictures
+_PERIOD = 0.1  # [s] of simulation between pictures, at first
+_MOST = 600  # pictures that are kept; beyond, every other one goes and the period doubles
 _LAST = 1.5  # [s] for which the outcome stands still
 _FONT = ImageFont.load_default(13)
 
@@ -79,6 +80,7 @@ class FilmRecorder:
         self.config = config or FilmConfig()
         self.pictures: list[Picture] = []
         self.times: list[float] = []
+        self._period = _PERIOD
         self._panels: dict[str, Picture] = {}
         self._watcher: Watcher | None = None
         self._caption = ""
@@ -89,7 +91,7 @@ class FilmRecorder:
     def tick(self, record: TickRecord) -> None:
         self._look_at_maps(record)
         now = record.simulation.time
-        due = not self.times or now - self.times[-1] >= _PERIOD - 1e-6
+        due = not self.times or now - self.times[-1] >= self._period - 1e-6
         if not due and record.event is None:
             return
         self._caption = (
@@ -138,6 +140,9 @@ class FilmRecorder:
         view = self._watcher.picture(simulation.data)
         self.pictures.append(_compose(view, self._panels, self._caption, event))
         self.times.append(simulation.time)
+        if len(self.pictures) > _MOST:
+            self.pictures, self.times = self.pictures[::2], self.times[::2]
+            self._period *= 2
 
     def _write_film(self) -> None:
         step = 1

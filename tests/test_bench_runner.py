@@ -13,7 +13,7 @@ import fakes
 import numpy as np
 import pytest
 
-from mpgrasp.bench.plan import Plan
+from mpgrasp.bench.plan import Plan, every_cell
 from mpgrasp.bench.player import Player
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.run_directory import RunDirectory
@@ -28,8 +28,9 @@ WHICH = {"suite": "thin", "episode": 0, "detector": DETECTOR, "controller": CONT
 
 
 def make_plan(**settings: Any) -> Plan:
-    defaults = {"suite": load_suite("thin"), "detectors": (DETECTOR,), "controllers": (CONTROLLER,)}
-    return Plan(**{**defaults, "episodes": 4, **settings})
+    names = {"detectors": (DETECTOR,), "controllers": (CONTROLLER,)}
+    names |= {key: settings.pop(key) for key in names if key in settings}
+    return Plan(suites=(load_suite("thin"),), cells=every_cell(**names), **{"episodes": 4, **settings})
 
 
 def lines_of(plan: Plan, run_episode: Any = fakes.run_episode, workers: int = 0) -> list[dict]:
@@ -129,7 +130,7 @@ def test_fewer_than_no_workers_are_refused() -> None:
 
 def test_recordings_have_names_that_every_file_system_takes() -> None:
     assert [task.stem for task in make_plan(episodes=1).tasks()] == [
-        "fakes-FakeDetector-fakes-FakeController-0000"
+        "thin-fakes-FakeDetector-fakes-FakeController-0000"
     ]
 
 
@@ -222,7 +223,7 @@ def test_a_full_disk_is_an_output_error(tmp_path: Path) -> None:
 def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:
     value = {"a": (1, np.int64(2)), "b": np.array([0.1 + 0.2]), "p": Path("x"), "o": object(), "s": {3, 1}}
     assert plain(value) == {"a": [1, 2], "b": [0.3], "p": "x", "o": "builtins.object", "s": [1, 3]}
-    assert json.loads(json.dumps(plain(make_plan())))["suite"]["scenes"][0]["objects"] == ["usb_stick"]
+    assert json.loads(json.dumps(plain(make_plan())))["suites"][0]["scenes"][0]["objects"] == ["usb_stick"]
 
 
 def test_the_first_difference_is_named_by_its_path() -> None:

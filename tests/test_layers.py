@@ -16,10 +16,13 @@ PACKAGE = Path(mpgrasp.__file__).parent
 
 PERCEPTION, WORLD = "perception", "world"
 ROWS: dict[str, tuple[int, str]] = {
-    **dict.fromkeys(["exceptions", "paths", "geometry", "plain"], (1, "")),
+    **dict.fromkeys(["exceptions", "paths", "geometry", "plain", "result_cache"], (1, "")),
     **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp", "false_colour"], (2, "")),
     **dict.fromkeys(["detectors", "grid_map", "entropy"], (3, PERCEPTION)),
-    **dict.fromkeys(["object_model", "objects", "terrain", "settling", "scene"], (3, WORLD)),
+    **dict.fromkeys(
+        ["object_model", "objects", "mesh_objects", "mesh_surface", "terrain", "settling", "scene"],
+        (3, WORLD),
+    ),
     **dict.fromkeys(
         [
             "panda",
@@ -48,7 +51,9 @@ ROWS: dict[str, tuple[int, str]] = {
             "execution",
             "execution_config",
             "lift_trial",
+            "clearing",
             "episode",
+            "episode_config",
             "episode_metrics",
             "episode_result",
             "recording",

@@ -1,4 +1,4 @@
-"""The benchmark's command line: `python -m mpgrasp.bench SUITE ...`, and `compare` and `replay` of runs."""
+"""The benchmark's command line: `python -m mpgrasp.bench SUITE ...`, and what is done with finished runs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mpgrasp.bench.command_line import Parser
 from mpgrasp.exceptions import ConfigError, MpgraspError
 
 EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
-SUBCOMMANDS = ("compare", "replay")
-"""Words in the place of SUITE that do something with runs that are there."""
+SUBCOMMANDS = {"compare": "compare", "replay": "replay", "report": "html_report"}
+"""Words in the place of SUITE that do something with runs that are there, and the module of each."""
 
 _EPILOG = """\
 examples:
@@ -22,9 +22,11 @@ examples:
   python -m mpgrasp.bench thin --detector dhrnet,ggcnn,oracle --controller mppc,mvp --episodes 100 --workers 2
   python -m mpgrasp.bench unseen --detector my_net:MyDetector --weights my_net.pt --record 3
   python -m mpgrasp.bench thin --episodes 50 --until-ci 10
+  python -m mpgrasp.bench paper --workers 2
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
+  python -m mpgrasp.bench report RUN                 (see report --help)
 
 Every detector and every controller meets the same scenes, sensor noise and start poses. The same
 command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
@@ -43,6 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
     from mpgrasp.bench.plan import CAMERA_BACKENDS
     from mpgrasp.bench.plugins import controller_names, detector_names
+    from mpgrasp.bench.programme import PROGRAMMES
     from mpgrasp.bench.suite import suite_names
     from mpgrasp.bench.workers import HANG_AFTER
     from mpgrasp.detectors import RUNTIMES
@@ -59,21 +62,27 @@ def make_parser() -> argparse.ArgumentParser:
         "suite",
         metavar="SUITE",
         nargs="?",
-        help=f"{', '.join(suite_names())}, or a path to a declaration.toml; may be left out with --resume",
+        help=f"{', '.join(suite_names())}, {', '.join(PROGRAMMES)} (all of Tables III to VI), or a path to a "
+        "declaration.toml; may be left out with --resume",
     )
     add(
         "--detector",
         metavar="D[,D]",
-        default="dhrnet",
-        help=f"{', '.join(detector_names())}, or your own as module:Class (default: dhrnet)",
+        help=f"{', '.join(detector_names())}, or your own as module:Class (default: dhrnet; "
+        "paper: ggcnn2, tfgrasp and dhrnet, with references)",
     )
     add(
         "--controller",
         metavar="C[,C]",
-        default="mppc",
-        help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc)",
+        help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc; "
+        "paper: mvp and mppc)",
     )
-    add("--episodes", metavar="N", type=int, default=10, help="episodes of each combination (default: 10)")
+    add(
+        "--episodes",
+        metavar="N",
+        type=int,
+        help="episodes of each combination (default: what the suite declares, the paper's number)",
+    )
     add(
         "--until-ci",
         metavar="W",
@@ -87,6 +96,23 @@ def make_parser() -> argparse.ArgumentParser:
         type=int,
         default=1000,
         help="where --until-ci ends in any case (default: 1000)",
+    )
+    add(
+        "--objects",
+        metavar="MESH",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="single and unseen: meshes in metres in the place of the suite's objects, one per episode in "
+        "turn: OBJ, PLY and STL files, folders of them, or ycb for those scans of the YCB set that the hand "
+        "can close on however they lie (pip install mpgrasp[ycb])",
+    )
+    add(
+        "--density",
+        metavar="D",
+        type=float,
+        default=500.0,
+        help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
     add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
@@ -178,7 +204,7 @@ def main(command: Sequence[str] | None = None) -> int:
     command = sys.argv[1:] if command is None else command
     try:
         if command and command[0] in SUBCOMMANDS:
-            module = importlib.import_module(f"mpgrasp.bench.{command[0]}")
+            module = importlib.import_module(f"mpgrasp.bench.{SUBCOMMANDS[command[0]]}")
             code: int = module.main(command[1:])
             return code
         arguments = parse(command)

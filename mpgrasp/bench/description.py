@@ -2,43 +2,62 @@
 
 from __future__ import annotations
 
+import hashlib
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.plan import Plan
 from mpgrasp.bench.player import Player
+from mpgrasp.bench.suite import Suite
 from mpgrasp.exceptions import OutputError
+from mpgrasp.plain import plain
 
 _PROGRAM = ("python", "-m", "mpgrasp.bench")
 
 
 def describe(plan: Plan, player: Player, command: Sequence[str]) -> dict[str, Any]:
-    """Content of run.json; its `configuration` is what two runs in one folder must agree in."""
+    """Content of run.json; its `configuration` is what two runs in one folder must agree in.
+
+    The world card of the first suite stands at the top; those of several stand by name in `worlds`.
+    """
     from mpgrasp.bench.provenance import provenance
     from mpgrasp.bench.world_card import world_card
 
+    cards = [world_card(suite, player.episode_configs[suite.name], plan.seed) for suite in plan.suites]
+    several = len(cards) > 1
     return {
         "format": 1,
         "command": shlex.join([*_PROGRAM, *command]),
         "started": datetime.now().astimezone().isoformat(timespec="seconds"),
         "configuration": configuration(plan, player),
-        **world_card(plan.suite, player.episode_config, plan.seed),
+        **cards[0],
+        **({"worlds": {s.name: card for s, card in zip(plan.suites, cards, strict=True)}} if several else {}),
+        **({"objects": [verdict.card() for verdict in plan.objects]} if plan.objects else {}),
         "made_with": provenance(),
     }
 
 
 def configuration(plan: Plan, player: Player) -> dict[str, Any]:
-    """All that decides what a run's lines say."""
+    """All that decides what a run's lines say; of a programme, `suite` is the name and `suites` says more."""
     from mpgrasp.bench.provenance import sha256
     from mpgrasp.detectors.detector import reads_truth
     from mpgrasp.paths import WEIGHTS
 
+    suites = [
+        {
+            "suite": suite_card(suite),
+            "episode": player.episode_configs[suite.name],
+            "episodes": plan.batch(suite),
+        }
+        for suite in plan.suites
+    ]
     return {
-        "suite": plan.suite,
-        "episode": player.episode_config,
+        **(suites[0] if plan.programme is None else {"suite": plan.programme, "suites": suites}),
+        "cells": ["/".join(cell) for cell in plan.cells],
         "detectors": [
             {
                 "name": name,
@@ -56,13 +75,31 @@ def configuration(plan: Plan, player: Player) -> dict[str, Any]:
             {"name": name, "config": getattr(controller, "config", None)}
             for name, controller in player.controllers.items()
         ],
-        "episodes": plan.episodes,
         "until_ci": plan.until_ci,
         "max_episodes": None if plan.until_ci is None else plan.max_episodes,
         "seed": plan.seed,
         "camera": plan.camera,
         "noise": plan.noise,
     }
+
+
+def suite_card(suite: Suite) -> dict[str, Any]:
+    """A suite as plain values; an object's mesh is given by the hash of its pieces."""
+    card: dict[str, Any] = plain(replace(suite, scenes=tuple(replace(s, objects=()) for s in suite.scenes)))
+    for scene, written in zip(suite.scenes, card["scenes"], strict=True):
+        written["objects"] = [_object_card(item) for item in scene.objects]
+    return card
+
+
+def _object_card(item: Any) -> Any:
+    meshes = [part.vertices for part in getattr(item, "parts", ()) if part.vertices is not None]
+    if not meshes:
+        return plain(item)
+    digest = hashlib.sha256()
+    for vertices in meshes:
+        digest.update(vertices.tobytes())
+    card: dict[str, Any] = plain(replace(item, parts=item.parts[:1]))
+    return {**card, "parts": {"pieces": len(item.parts), "sha256": digest.hexdigest()}}
 
 
 def command_of(run: dict[str, Any], path: Path) -> list[str]:

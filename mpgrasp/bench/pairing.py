@@ -51,15 +51,7 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
     Raises:
         ConfigError: the same episode had another scene in the other run, or occurs twice.
     """
-    ours, theirs = _by_world(a), _by_world(b)
-    pairs = [(ours[key], theirs[key]) for key in ours if key in theirs]
-    for one, other in pairs:
-        if one["scene_seed"] != other["scene_seed"]:
-            raise ConfigError(
-                f"episode {one['episode']} of {one['suite']} had another scene in the other run",
-                got=(one["scene_seed"], other["scene_seed"]),
-                allowed="the same scene_seed",
-            )
+    pairs = pair_worlds(a, b)
     wins = [(bool(one["success"]), bool(other["success"])) for one, other in pairs]
     times = [
         other["sim_time_s"] - one["sim_time_s"] for one, other in pairs if one["success"] and other["success"]
@@ -78,6 +70,26 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
         time_low=low,
         time_high=high,
     )
+
+
+def pair_worlds(
+    a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]
+) -> list[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+    """The lines of A and B about the same suite, seed and episode; error rows are left out.
+
+    Raises:
+        ConfigError: the same episode had another scene in the other run, or occurs twice.
+    """
+    ours, theirs = _by_world(a), _by_world(b)
+    pairs = [(ours[key], theirs[key]) for key in ours if key in theirs]
+    for one, other in pairs:
+        if one["scene_seed"] != other["scene_seed"]:
+            raise ConfigError(
+                f"episode {one['episode']} of {one['suite']} had another scene in the other run",
+                got=(one["scene_seed"], other["scene_seed"]),
+                allowed="the same scene_seed",
+            )
+    return pairs
 
 
 def _by_world(lines: Iterable[Mapping[str, Any]]) -> dict[Hashable, Mapping[str, Any]]:

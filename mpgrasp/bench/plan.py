@@ -1,18 +1,42 @@
-"""What a run is asked to do: the suite, the cells (detector, controller) and how many episodes of each."""
+"""What a run is asked to do: suites, cells (detector, controller) and how many episodes of each."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from mpgrasp.bench.suite import Suite
 from mpgrasp.detectors import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 
+if TYPE_CHECKING:
+    from mpgrasp.bench.object_check import Verdict
+
 CAMERA_BACKENDS = ("auto", "gl", "ray")
+
+
+class Cell(NamedTuple):
+    """A detector and a controller that play together."""
+
+    detector: str
+    """Registry name or import path."""
+    controller: str
+    """Registry name or import path."""
+
+
+def every_cell(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Cell, ...]:
+    """Every detector with every controller.
+
+    Raises:
+        ConfigError: a list that is empty or names something twice or not at all.
+    """
+    for kind, names in (("detector", detectors), ("controller", controllers)):
+        if not names or not all(names) or len(set(names)) < len(names):
+            raise ConfigError(f"unusable list of {kind}s", got=",".join(names), allowed=f"different {kind}s")
+    return tuple(Cell(detector, controller) for detector in detectors for controller in controllers)
 
 
 class EpisodeKey(NamedTuple):
@@ -28,6 +52,7 @@ class EpisodeKey(NamedTuple):
 class Task:
     """One episode of one cell."""
 
+    suite: str
     episode: int
     detector: str
     controller: str
@@ -35,28 +60,31 @@ class Task:
     @property
     def stem(self) -> str:
         """File name, without ending, of what is recorded of this episode."""
-        name = f"{self.detector}-{self.controller}-{self.episode:04d}"
+        name = f"{self.suite}-{self.detector}-{self.controller}-{self.episode:04d}"
         return re.sub(r"[^A-Za-z0-9._-]+", "-", name)
 
     def __str__(self) -> str:
-        return f"episode {self.episode} ({self.detector}, {self.controller})"
+        return f"episode {self.episode} of {self.suite} ({self.detector}, {self.controller})"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """All that decides what a run does."""
 
-    suite: Suite
-    detectors: tuple[str, ...] = ("dhrnet",)
-    """Registry names or import paths."""
-    controllers: tuple[str, ...] = ("mppc",)
-    """Registry names or import paths."""
+    suites: tuple[Suite, ...]
+    """Played one after the other, by the same cells."""
+    programme: str | None = None
+    """Name of what the suites are played for, where it is more than one suite."""
+    cells: tuple[Cell, ...] = (Cell("dhrnet", "mppc"),)
+    """In the order of their turns."""
     weights: Mapping[str, Path] = field(default_factory=dict)
     """Weights files by detector; the others take what ships with mpgrasp."""
     runtime: str = "auto"
     """What computes the networks: auto, torch or openvino."""
-    episodes: int = 10
-    """Episodes of each cell; with `until_ci` the size of a batch."""
+    objects: tuple[Verdict, ...] = ()
+    """What came of every mesh that was to take the place of the suite's objects."""
+    episodes: int | None = None
+    """Episodes of each cell in each suite, with `until_ci` the size of a batch; None: as a suite declares."""
     until_ci: float | None = None
     """Batches are added until the 95 % interval of every cell is narrower than this [percentage points]."""
     max_episodes: int = 1000
@@ -70,50 +98,67 @@ class Plan:
     """Number of episodes of each cell that are recorded, the first ones."""
     recordings: Path | None = None
     """Folder of the recordings."""
+    traces: Path | None = None
+    """Folder of what the report is drawn from; None keeps nothing."""
 
     def __post_init__(self) -> None:
         for name, value, least in (
             ("episodes", self.episodes, 1), ("seed", self.seed, 0), ("record", self.record, 0),
         ):  # fmt: skip
-            if value < least:
+            if value is not None and value < least:
                 raise ConfigError(f"{name} out of range", got=value, allowed=f"{least} or more")
         if self.until_ci is not None and not 0 < self.until_ci < 100:
             raise ConfigError(
                 "until-ci out of range", got=self.until_ci, allowed="percentage points between 0 and 100"
             )
-        if self.until_ci is not None and self.max_episodes < self.episodes:
-            raise ConfigError(
-                "max-episodes out of range", got=self.max_episodes, allowed=f"{self.episodes} or more"
-            )
+        batch = max(self.batch(suite) for suite in self.suites)
+        if self.until_ci is not None and self.max_episodes < batch:
+            raise ConfigError("max-episodes out of range", got=self.max_episodes, allowed=f"{batch} or more")
         for name, choice, allowed in (
             ("camera backend", self.camera, CAMERA_BACKENDS), ("runtime", self.runtime, RUNTIMES),
         ):  # fmt: skip
             if choice not in allowed:
                 raise ConfigError(f"unknown {name}", got=choice, allowed=allowed)
-        for kind, names in (("detector", self.detectors), ("controller", self.controllers)):
-            if not names or not all(names) or len(set(names)) < len(names):
-                raise ConfigError(
-                    f"unusable list of {kind}s", got=",".join(names), allowed=f"different {kind}s"
-                )
         for name in self.weights:
             if name not in self.detectors:
                 raise ConfigError(
                     "weights for a detector that does not run", got=name, allowed=self.detectors
                 )
 
-    def tasks(self, start: int = 0, stop: int | None = None) -> list[Task]:
-        """Every episode from `start` to before `stop` (`episodes` if not given) of every cell, in order.
+    @property
+    def detectors(self) -> tuple[str, ...]:
+        """Names of all detectors that play."""
+        return tuple(dict.fromkeys(cell.detector for cell in self.cells))
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """Names of all controllers that play."""
+        return tuple(dict.fromkeys(cell.controller for cell in self.cells))
+
+    def suite(self, name: str) -> Suite:
+        """The suite of that name, which must be one of the plan's."""
+        return next(suite for suite in self.suites if suite.name == name)
+
+    def batch(self, suite: Suite) -> int:
+        """Episodes of each cell in a suite; with `until_ci` those that are added at a time."""
+        return suite.trials if self.episodes is None else self.episodes
+
+    def tasks(self) -> list[Task]:
+        """A batch of every suite, in order."""
+        return [task for suite in self.suites for task in self.tasks_of(suite, 0, self.batch(suite))]
+
+    def tasks_of(self, suite: Suite, start: int, stop: int) -> list[Task]:
+        """Every episode of a suite from `start` to before `stop`, of every cell, in order.
 
         Episode by episode, every cell plays in turn, so that a run that is stopped half-way still
         compares its cells over the same episodes.
         """
         return [
-            Task(episode=episode, detector=detector, controller=controller)
-            for episode in range(start, self.episodes if stop is None else stop)
-            for detector in self.detectors
-            for controller in self.controllers
+            Task(suite=suite.name, episode=episode, detector=cell.detector, controller=cell.controller)
+            for episode in range(start, stop)
+            for cell in self.cells
         ]
 
     def key(self, task: Task) -> EpisodeKey:
         """Key of the task's line."""
-        return EpisodeKey(self.suite.name, task.episode, task.detector, task.controller)
+        return EpisodeKey(task.suite, task.episode, task.detector, task.controller)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from mpgrasp.bench.plan import Plan, Task
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.suite import episode_seed
-from mpgrasp.exceptions import MpgraspError, OutputError
+from mpgrasp.bench.trace import TraceRecorder
+from mpgrasp.camera import has_colour
+from mpgrasp.detectors.detector import prepare, reads_colour
+from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
 from mpgrasp.recording import NullRecorder, Recorder
 
 Line = dict[str, Any]
@@ -16,6 +19,9 @@ Line = dict[str, Any]
 
 RunEpisode = Callable[..., Any]
 """Called like `mpgrasp.episode.run_episode`; returns what has `as_record()`."""
+
+Games = RunEpisode | Mapping[str, RunEpisode]
+"""What plays an episode, for all trials or by trial."""
 
 ERROR = "error"
 """`outcome` of an episode that could not be played: no failure of a grasp, and counted apart."""
@@ -32,14 +38,29 @@ class Player:
         ConfigError, WeightsError: a detector, controller or setting that cannot be used.
     """
 
-    def __init__(self, plan: Plan, run_episode: RunEpisode | None = None) -> None:
+    def __init__(self, plan: Plan, run_episode: Games | None = None) -> None:
         self.plan = plan
         self.detectors = {
             name: load_detector(name, plan.weights.get(name), plan.runtime) for name in plan.detectors
         }
         self.controllers = {name: load_controller(name) for name in plan.controllers}
-        self.episode_config = plan.suite.episode_config(camera=plan.camera, noise=plan.noise)
-        self._run_episode = run_episode or real_run_episode()
+        self.episode_configs = {
+            suite.name: suite.episode_config(camera=plan.camera, noise=plan.noise) for suite in plan.suites
+        }
+        self._run_episode = run_episode or real_games()
+
+    def prepare(self) -> list[str]:
+        """Have networks compiled now, once for all workers; a line for people of each that was.
+
+        Raises:
+            ConfigError: a detector reads colour, and the camera has none.
+        """
+        for name, detector in self.detectors.items():
+            if reads_colour(detector) and not has_colour(self.plan.camera):
+                raise ConfigError(
+                    f"{name} reads colour, which takes OpenGL", got=f"camera {self.plan.camera}", allowed="gl"
+                )
+        return [line for line in map(prepare, self.detectors.values()) if line]
 
     def play(self, task: Task) -> Line:
         """The line of one episode, to go to episodes.jsonl.
@@ -48,33 +69,41 @@ class Player:
             OutputError: its recording cannot be written.
             EpisodeError: something else went wrong on the way; it is the cause.
         """
-        suite = self.plan.suite
+        suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
+        run_episode = games if callable(games) else games[suite.trial]
         try:
-            result = self._run_episode(
+            result = run_episode(
                 suite.scene_config(task.episode),
                 episode_seed(suite.name, self.plan.seed, task.episode),
                 detector=self.detectors[task.detector],
                 controller=self.controllers[task.controller],
-                config=self.episode_config,
-                recorder=self._recorder(task),
+                config=self.episode_configs[suite.name],
+                recorder=self._recorder(task, trace),
             )
             record = result.as_record()
+            if trace is not None:
+                trace.save(record)
         except OutputError:
             raise
         except Exception as error:
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
         return {**record, **_which(self.plan, task)}
 
-    def _recorder(self, task: Task) -> Recorder:
+    def _trace(self, task: Task) -> TraceRecorder | None:
+        folder = self.plan.traces
+        return None if folder is None else TraceRecorder(folder, task.stem, self.plan.camera)
+
+    def _recorder(self, task: Task, trace: TraceRecorder | None) -> Recorder:
         if self.plan.recordings is None or task.episode >= self.plan.record:
-            return NullRecorder()
+            return trace or NullRecorder()
         from mpgrasp.film import FilmConfig, FilmRecorder
         from mpgrasp.recording import TeeRecorder
         from mpgrasp.rerun_recorder import RerunRecorder
 
         stem = self.plan.recordings / task.stem
         film = FilmRecorder(f"{stem}.gif", config=FilmConfig(backend=self.plan.camera))
-        return TeeRecorder(RerunRecorder(f"{stem}.rrd"), film)
+        recorders: list[Recorder] = [RerunRecorder(f"{stem}.rrd"), film, *([trace] if trace else [])]
+        return TeeRecorder(*recorders)
 
 
 def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> Line:
@@ -95,18 +124,19 @@ def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> L
     }
 
 
-def real_run_episode() -> RunEpisode:
-    """The function that plays real episodes; loads MuJoCo."""
+def real_games() -> Games:
+    """The functions that play real episodes, by trial; loads MuJoCo."""
+    from mpgrasp.clearing import run_clearing
     from mpgrasp.episode import run_episode
 
-    return run_episode
+    return {"grasp": run_episode, "clear": run_clearing}
 
 
 def _which(plan: Plan, task: Task) -> Line:
     return {
-        "suite": plan.suite.name,
+        "suite": task.suite,
         "seed": plan.seed,
-        "scene_seed": episode_seed(plan.suite.name, plan.seed, task.episode),
+        "scene_seed": episode_seed(task.suite, plan.seed, task.episode),
         "episode": task.episode,
         "detector": task.detector,
         "controller": task.controller,

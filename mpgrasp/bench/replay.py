@@ -12,7 +12,7 @@ from typing import Any
 from mpgrasp.bench.cell_path import find_cell
 from mpgrasp.bench.command_line import Parser
 from mpgrasp.bench.description import command_of, configuration
-from mpgrasp.bench.plan import Plan, Task
+from mpgrasp.bench.plan import Cell, Plan, Task
 from mpgrasp.bench.player import ERROR, Line, Player
 from mpgrasp.bench.provenance import provenance
 from mpgrasp.bench.run import key_of, make_plan
@@ -41,7 +41,11 @@ def make_parser() -> Parser:
     add = parser.add_argument
     add("run", metavar="RUN", type=Path, help="folder of the run")
     add("--episode", metavar="K", type=int, required=True, help="number of the episode, counted from 0")
-    add("--cell", metavar="D/C", help="detector/controller; may be left out where the run has one cell")
+    add(
+        "--cell",
+        metavar="[S/]D/C",
+        help="[suite/]detector/controller; may be left out where the run has one cell",
+    )
     add("--record", action="store_true", help="record it, for rerun and as GIF")
     add("--out", metavar="DIR", type=Path, help="folder of the recording (default: RUN/recordings)")
     return parser
@@ -75,20 +79,23 @@ def main(command: Sequence[str]) -> int:
 
 def _one_episode(plan: Plan, arguments: Any) -> tuple[Plan, Task]:
     """The plan with one cell left, and the task."""
-    cells = [(plan.suite.name, d, c) for d in plan.detectors for c in plan.controllers]
+    cells = [(suite.name, *cell) for suite in plan.suites for cell in plan.cells]
     if arguments.cell is None and len(cells) > 1:
-        raise ConfigError("the run has several cells", allowed=[f"--cell {d}/{c}" for _, d, c in cells])
+        names = [f"{s}/{d}/{c}" if len(plan.suites) > 1 else f"{d}/{c}" for s, d, c in cells]
+        raise ConfigError("the run has several cells", allowed=[f"--cell {name}" for name in names])
     if arguments.episode < 0:
         raise ConfigError("episode out of range", got=arguments.episode, allowed="0, 1, 2, ...")
     cell = find_cell(cells, arguments.cell or "/".join(cells[0]))
-    task = Task(episode=arguments.episode, detector=cell.detector, controller=cell.controller)
+    task = Task(
+        suite=cell.suite, episode=arguments.episode, detector=cell.detector, controller=cell.controller
+    )
     plan = replace(
         plan,
-        detectors=(cell.detector,),
-        controllers=(cell.controller,),
+        cells=(Cell(cell.detector, cell.controller),),
         weights={name: file for name, file in plan.weights.items() if name == cell.detector},
         record=task.episode + 1 if arguments.record else 0,
         recordings=arguments.out or arguments.run / "recordings",
+        traces=None,
     )
     return plan, task
 
@@ -104,7 +111,7 @@ def _difference_of_configurations(then: dict[str, Any], now: dict[str, Any], tas
     """What has changed of the one cell, in words; other cells of the run do not matter."""
     names = {"detectors": task.detector, "controllers": task.controller}
     kept = {key: [item for item in then[key] if item["name"] == name] for key, name in names.items()}
-    found = difference({**then, **kept}, now)
+    found = difference({**then, **kept, "cells": now["cells"]}, now)
     return found and found.replace(" there", " then").replace(" here", " now")
 
 

@@ -45,6 +45,11 @@ def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     for heading in (*headings, *(["errors"] if errors else [])):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("failures")
+    clearing = any(cell["clearing"] for cell in cells)
+    if clearing:
+        for heading in ("picks", "knocked\noff", "left"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("failed picks")
     for cell in cells:
         table.add_row(
             cell["suite"],
@@ -58,10 +63,22 @@ def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
             _with_interval(cell["mean_time_s"], cell["mean_time_low"], cell["mean_time_high"]),
             str(cell["reflex_stops"]),
             *([str(cell["errors"])] if errors else []),
-            # no blank within a cause, so that it is never torn apart
-            " ".join(f"{outcome}:{count}" for outcome, count in cell["failures"].items()) or "none",
+            _causes(cell["failures"]),
+            *(_clearing(cell["clearing"]) if clearing else []),
         )
     return table
+
+
+def _causes(counts: Mapping[str, int]) -> str:
+    # no blank within a cause, so that it is never torn apart
+    return " ".join(f"{outcome}:{count}" for outcome, count in counts.items()) or "none"
+
+
+def _clearing(row: Mapping[str, Any] | None) -> list[str]:
+    if row is None:
+        return ["-"] * 4
+    numbers = [str(row[key]) for key in ("attempts", "knocked_off", "left")]
+    return [*numbers, _causes(row["failed_attempts"])]
 
 
 def _number(value: float | None) -> str:

@@ -7,20 +7,28 @@ import sys
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mpgrasp.bench.description import describe
 from mpgrasp.bench.interrupts import interrupts_wait
-from mpgrasp.bench.plan import EpisodeKey, Plan
+from mpgrasp.bench.plan import EpisodeKey, Plan, Task, every_cell
 from mpgrasp.bench.player import ERROR, EpisodeError, Line, Player
 from mpgrasp.bench.plugins import check_name, controller_names, detector_names, parse_weights
+from mpgrasp.bench.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.report import ProgressReport, print_table, print_tests
 from mpgrasp.bench.run_directory import RunDirectory
 from mpgrasp.bench.runner import Crew, make_crew
-from mpgrasp.bench.suite import load_suite
+from mpgrasp.bench.suite import Suite
 from mpgrasp.bench.summary import paired_tests, summarise
+from mpgrasp.bench.trace import prune_traces
 from mpgrasp.exceptions import ConfigError, OutputError
 
+if TYPE_CHECKING:
+    from mpgrasp.bench.object_check import Verdict
+
 EXIT_BROKEN, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+DETECTOR, CONTROLLER = "dhrnet", "mppc"
+"""Who plays a suite unless told otherwise."""
 
 
 def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
@@ -29,18 +37,28 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     Raises:
         ConfigError: input that cannot be used.
     """
-    detectors, controllers = (tuple(names.split(",")) for names in (arguments.detector, arguments.controller))
-    for name in detectors:
+    detectors, controllers = (
+        None if names is None else tuple(names.split(","))
+        for names in (arguments.detector, arguments.controller)
+    )
+    for name in detectors or ():
         check_name("detector", name, detector_names())
-    for name in controllers:
+    for name in controllers or ():
         check_name("controller", name, controller_names())
-    suite = load_suite(arguments.suite)
-    out = arguments.out or Path("runs") / f"{suite.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    suites, programme = load_suites(arguments.suite), PROGRAMMES.get(arguments.suite)
+    if programme is None:
+        cells = every_cell(detectors or (DETECTOR,), controllers or (CONTROLLER,))
+    else:
+        cells = programme.cells(detectors, controllers)
+    suites, objects = _with_objects(suites, arguments)
+    name = suites[0].name if programme is None else arguments.suite
+    out = arguments.out or Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     plan = Plan(
-        suite=suite,
-        detectors=detectors,
-        controllers=controllers,
-        weights=parse_weights(arguments.weights, detectors),
+        suites=suites,
+        objects=objects,
+        programme=None if programme is None else name,
+        cells=cells,
+        weights=parse_weights(arguments.weights, list(dict.fromkeys(cell.detector for cell in cells))),
         runtime=arguments.runtime,
         episodes=arguments.episodes,
         until_ci=arguments.until_ci,
@@ -50,8 +68,29 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         noise=not arguments.no_noise,
         record=arguments.record,
         recordings=out / "recordings",
+        traces=out / "traces",
     )
     return plan, out
+
+
+def _with_objects(
+    suites: tuple[Suite, ...], arguments: argparse.Namespace
+) -> tuple[tuple[Suite, ...], tuple[Verdict, ...]]:
+    """The suites with the objects that the command line brings, if any, and what came of every mesh."""
+    if not arguments.objects:
+        return suites, ()
+    if len(suites) > 1:
+        raise ConfigError("--objects with several suites", got=arguments.suite, allowed="one suite")
+    from mpgrasp.bench.object_intake import take_objects
+
+    suite, verdicts = take_objects(
+        suites[0],
+        arguments.objects,
+        density=arguments.density,
+        workers=arguments.workers,
+        quiet=arguments.quiet,
+    )
+    return (suite,), verdicts
 
 
 def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
@@ -67,8 +106,15 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         raise ConfigError("workers out of range", got=arguments.workers, allowed="0 or more")
     plan, out = make_plan(arguments)
     player = Player(plan)  # whatever is wrong with a detector or controller shows before the first episode
+    ready = player.prepare()
+    if plan.objects:
+        from mpgrasp.bench.object_intake import print_verdicts
+
+        print_verdicts(plan.objects)
     content = describe(plan, player, command)
     with ProgressReport(quiet=arguments.quiet) as progress:
+        for line in ready:
+            progress.note(line)
         if arguments.resume:
             directory = RunDirectory.resume(out, content, progress.note)
         else:
@@ -112,41 +158,50 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Pro
             directory.append(line, stems[key_of(line)])
             progress.add(line)
 
-    stop = 0
-    while True:
-        start, stop = stop, stop + plan.episodes
-        if plan.until_ci is not None:
-            stop = min(stop, plan.max_episodes)
-        tasks = plan.tasks(start, stop)
-        stems = {plan.key(task): task.stem for task in tasks}
-        progress.expect(len(plan.tasks(0, stop)))
+    def play(tasks: list[Task]) -> None:
+        stems.update({plan.key(task): task.stem for task in tasks})
         crew.play([task for task in tasks if plan.key(task) not in played], sink, progress.note)
-        if plan.until_ci is None or _narrow(plan, directory.episodes(), stop):
-            return True
-        if stop == plan.max_episodes:
+
+    if plan.until_ci is None:
+        progress.expect(len(plan.tasks()))
+        play(plan.tasks())
+        return True
+    done = 0
+    for suite in plan.suites:
+        stop, narrow = 0, False
+        while not narrow and stop < plan.max_episodes:
+            start, stop = stop, min(stop + plan.batch(suite), plan.max_episodes)
+            progress.expect(done + stop * len(plan.cells))
+            play(plan.tasks_of(suite, start, stop))
+            narrow = _narrow(plan, suite, directory.episodes(), stop)
+        if not narrow:
             progress.note(
-                f"{plan.max_episodes} episodes of each combination have not brought every interval below "
-                f"{plan.until_ci:g} points; --max-episodes allows more"
+                f"{plan.max_episodes} episodes of each combination have not brought every interval of "
+                f"{suite.name} below {plan.until_ci:g} points; --max-episodes allows more"
             )
-            return True
+        done += stop * len(plan.cells)
+    return True
 
 
-def _narrow(plan: Plan, lines: Sequence[Line], stop: int) -> bool:
-    """Whether the first `stop` episodes leave no cell's interval as wide as `until_ci`."""
+def _narrow(plan: Plan, suite: Suite, lines: Sequence[Line], stop: int) -> bool:
+    """Whether the first `stop` episodes of a suite leave no cell's interval as wide as `until_ci`."""
     assert plan.until_ci is not None
-    cells = summarise(line for line in lines if line["episode"] < stop)
+    cells = summarise(line for line in lines if line["suite"] == suite.name and line["episode"] < stop)
     widths = [100 * (cell["wilson_high"] - cell["wilson_low"]) for cell in cells]
-    everyone = len(plan.detectors) * len(plan.controllers)
-    return len(widths) == everyone and max(widths) < plan.until_ci
+    return len(widths) == len(plan.cells) and max(widths) < plan.until_ci
 
 
 def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
     """Put the lines in order, write and print what they add up to; the exit code that follows from it."""
+    from mpgrasp.bench.html_report import write_report
+
     code = 0
     lines = directory.episodes()
-    order = [
-        plan.key(task) for task in plan.tasks(0, 1 + max((line["episode"] for line in lines), default=-1))
-    ]
+    last = {
+        suite.name: max((line["episode"] for line in lines if line["suite"] == suite.name), default=-1)
+        for suite in plan.suites
+    }
+    order = [plan.key(t) for suite in plan.suites for t in plan.tasks_of(suite, 0, 1 + last[suite.name])]
     rank = {key: k for k, key in enumerate(order)}
     lines.sort(key=lambda line: rank.get(key_of(line), len(rank)))
     cells, tests = summarise(lines), paired_tests(lines)
@@ -154,6 +209,8 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
     try:
         directory.settle(order)
         directory.write_summary({"complete": finished and not errors, "cells": cells, "paired_tests": tests})
+        prune_traces(directory.path / "traces")
+        write_report([directory.path], directory.path)
     except OutputError as error:
         print(f"mpgrasp: error: {error}", file=sys.stderr)
         code = EXIT_BAD_INPUT

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mpgrasp.bench.plan import Plan, Task
-from mpgrasp.bench.player import EpisodeError, Line, Player, RunEpisode, error_line, real_run_episode
+from mpgrasp.bench.player import EpisodeError, Games, Line, Player, error_line, real_games
 from mpgrasp.bench.workers import HANG_AFTER, WorkerPool
 from mpgrasp.exceptions import ConfigError
 
@@ -48,7 +48,7 @@ def make_crew(
     plan: Plan,
     workers: int,
     *,
-    run_episode: RunEpisode | None = None,
+    run_episode: Games | None = None,
     player: Player | None = None,
     hang_after: float = HANG_AFTER,
 ) -> Crew:
@@ -67,7 +67,7 @@ def make_crew(
         raise ConfigError("workers out of range", got=workers, allowed="0 or more")
     if not hang_after > 0:
         raise ConfigError("hang-after out of range", got=hang_after, allowed="more than 0 s")
-    run_episode = run_episode or real_run_episode()
+    run_episode = run_episode or real_games()
     if workers:
         return WorkerPool(plan, workers, run_episode, hang_after=hang_after, attempts=ATTEMPTS)
     return _ThisProcess(plan, run_episode, player)
@@ -78,7 +78,7 @@ def play_all(
     sink: Sink,
     *,
     workers: int = 0,
-    run_episode: RunEpisode | None = None,
+    run_episode: Games | None = None,
     hang_after: float = HANG_AFTER,
     note: Note = lambda _: None,
 ) -> None:
@@ -91,7 +91,7 @@ def play_all(
 
 
 class _ThisProcess:
-    def __init__(self, plan: Plan, run_episode: RunEpisode, player: Player | None) -> None:
+    def __init__(self, plan: Plan, run_episode: Games, player: Player | None) -> None:
         self._plan, self._run_episode = plan, run_episode
         self._player = player or Player(plan, run_episode)
 

@@ -1,9 +1,10 @@
 """Benchmark suites: what is on the table in each episode, as declared in benchmarks/*.toml.
 
 A declaration has a `title`, a `[scene]` table with fields of `SceneConfig` that all episodes share,
-optionally `[[turns]]` (episode k takes turn k modulo their number, on top of `[scene]`), and optionally
-an `[episode]` table with fields of `EpisodeConfig`. Anything else is an error. benchmarks/README.md
-explains the format to users.
+optionally `[[turns]]` (episode k takes turn k modulo their number, on top of `[scene]`), optionally
+`trial` ("grasp", or "clear" where the table is to be cleared into a basket) and `trials` (episodes that are
+played unless a number is given), and optionally an `[episode]` table with fields of `EpisodeConfig` or
+`ClearingConfig`. Anything else is an error. benchmarks/README.md explains the format to users.
 """
 
 from __future__ import annotations
@@ -22,10 +23,14 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.paths import BENCHMARKS
 
 if TYPE_CHECKING:
-    from mpgrasp.episode import EpisodeConfig
+    from mpgrasp.episode_config import EpisodeConfig
     from mpgrasp.scene import SceneConfig
 
-_TABLES = ("title", "scene", "turns", "episode")
+_KEYS = ("title", "trial", "trials", "scene", "turns", "episode")
+TRIALS = ("grasp", "clear")
+"""What an episode can be: one grasp, or a table to be cleared."""
+BOX_DENSITY = 1000.0
+"""Of a box that is declared by its size [kg/m3]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +41,23 @@ class Suite:
     title: str
     scenes: tuple[SceneConfig, ...]
     """One per turn; episode k takes scene k modulo their number."""
+    trial: str = "grasp"
+    """One of `TRIALS`."""
+    trials: int = 10
+    """Episodes of each combination that are played unless a number is given."""
     episode: Mapping[str, Any] = field(default_factory=dict)
-    """Fields of `EpisodeConfig` in which this suite departs from the defaults."""
+    """Fields of `EpisodeConfig`, or of `ClearingConfig`, in which this suite departs from the defaults."""
 
     def __post_init__(self) -> None:
+        where = f"suite {self.name!r}"
         if not self.scenes:
-            raise ConfigError(f"suite {self.name!r} has no scene", allowed="one scene or more")
+            raise ConfigError(f"{where} has no scene", allowed="one scene or more")
+        if self.trial not in TRIALS:
+            raise ConfigError(f"{where}: unknown trial", got=self.trial, allowed=TRIALS)
+        if not isinstance(self.trials, int) or self.trials < 1:
+            raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed="1 or more")
+        if self.trial == "clear" and not all(scene.basket for scene in self.scenes):
+            raise ConfigError(f"{where}: clearing needs a basket", got="basket = false", allowed="true")
 
     @property
     def scene(self) -> SceneConfig:
@@ -56,12 +72,14 @@ class Suite:
         """How an episode runs: the suite's settings with the caller's camera backend and noise switch.
 
         Raises:
-            ConfigError: a setting that `EpisodeConfig` does not have, or refuses.
+            ConfigError: a setting that the trial's config does not have, or refuses.
         """
-        from mpgrasp.episode import EpisodeConfig
+        from mpgrasp.episode_config import ClearingConfig, EpisodeConfig
 
+        kind = ClearingConfig if self.trial == "clear" else EpisodeConfig
         settings = {**self.episode, "camera_backend": camera, "noise": noise}
-        return _construct(EpisodeConfig, settings, f"suite {self.name!r}, [episode]")
+        config: EpisodeConfig = _construct(kind, settings, f"suite {self.name!r}, [episode]")
+        return config
 
 
 def suite_names() -> tuple[str, ...]:
@@ -101,7 +119,7 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
     from mpgrasp.scene import SceneConfig
 
     where = f"suite {name!r}"
-    _refuse_unknown(declared, _TABLES, where)
+    _refuse_unknown(declared, _KEYS, where)
     title = declared.get("title")
     if not isinstance(title, str) or not title:
         raise ConfigError(f"{where} has no title", got=title, allowed='title = "..."')
@@ -112,8 +130,12 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
             raise ConfigError(f"{where}, {key} is not a table", got=table, allowed=f"[{key}]")
     if not isinstance(turns, list) or not all(isinstance(turn, dict) for turn in turns):
         raise ConfigError(f"{where}, turns is not a list of tables", got=turns, allowed="[[turns]]")
-    scenes = tuple(_construct(SceneConfig, {**shared, **turn}, f"{where}, [scene]") for turn in turns)
-    return Suite(name=name, title=title, scenes=scenes, episode=_as_tuples(episode))
+    scenes = tuple(
+        _construct(SceneConfig, _with_objects({**shared, **turn}, where), f"{where}, [scene]")
+        for turn in turns
+    )
+    settings = {key: declared[key] for key in ("trial", "trials") if key in declared}
+    return Suite(name=name, title=title, scenes=scenes, episode=_as_tuples(episode), **settings)
 
 
 def episode_seed(suite: str, seed: int, episode: int) -> int:
@@ -136,6 +158,28 @@ def _construct(kind: Any, settings: Mapping[str, Any], where: str) -> Any:
         return kind(**_as_tuples(settings))
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{where}: {error}") from error
+
+
+def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The table of a scene with `{ box = [x, y, z] }` among its objects made into boxes."""
+    objects = scene.get("objects")
+    if not isinstance(objects, list):
+        return dict(scene)
+    return {**scene, "objects": [_box(o, where) if isinstance(o, dict) else o for o in objects]}
+
+
+def _box(declared: Mapping[str, Any], where: str) -> Any:
+    """A box of some size, such as a stick of a certain thickness."""
+    from mpgrasp.object_model import ObjectModel, Part
+
+    _refuse_unknown(declared, ("box", "name", "density"), f"{where}, objects")
+    edges, density = declared.get("box"), declared.get("density", BOX_DENSITY)
+    try:
+        part = Part(shape="box", size=tuple(edge / 2 for edge in edges or ()))
+        name = declared.get("name", "box")
+        return ObjectModel(name=name, parts=(part,), mass=density * part.volume, provenance="its suite")
+    except TypeError as error:
+        raise ConfigError(f"{where}: unusable box", got=dict(declared), allowed="edges [m]") from error
 
 
 def _refuse_unknown(table: Mapping[str, Any], allowed: Iterable[str], where: str) -> None:

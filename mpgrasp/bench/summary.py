@@ -10,7 +10,7 @@ from typing import Any
 
 from mpgrasp.bench.pairing import pair
 from mpgrasp.bench.player import ERROR
-from mpgrasp.bench.statistics import holm, mean_interval, restricted, wilson_interval
+from mpgrasp.bench.statistics import holm, mean_interval, median_interval, restricted, wilson_interval
 
 MOTION = (
     "min_singular_value", "near_singularity_s", "path_length_m", "jerk_rms", "spectral_arc_length",
@@ -33,21 +33,39 @@ def summarise(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """One JSON-ready row per cell (suite, detector, controller), in order of first appearance.
 
     Keys: suite, detector, controller; n (error rows do not count), errors, successes, rate, wilson_low,
-    wilson_high; median_time_s; mean_time_s, mean_time_low, mean_time_high and time_limit_s (of the
-    restricted mean where an episode of the suite hit its limit, else None); reflex_stops, reflexes
-    {limit: count}, failures {outcome: count}, objects {name: {n, successes}}, motion {key: median} and
-    worst_singular_value.
+    wilson_high; median_time_s, median_time_low, median_time_high; mean_time_s, mean_time_low,
+    mean_time_high and time_limit_s (of the restricted mean where an episode of the suite hit its limit,
+    else None); reflex_stops, reflexes {limit: count}, failures {outcome: count}, objects
+    {name: {n, successes}}, motion {key: median} and worst_singular_value; clearing: None or, over all
+    episodes in which a table was to be cleared, attempts, failed_attempts {outcome: count}, and numbers of
+    objects in_basket, knocked_off and left.
     """
     cells = by_cell(episodes)
-    limits = {
-        suite: min(
-            (line["sim_time_s"] for (name, _, _), lines in cells.items() if name == suite for line in lines
-             if line["outcome"] == "timeout"),
-            default=None,
-        )
-        for suite, _, _ in cells
-    }  # fmt: skip
+    limits = time_limits(cells)
     return [_cell(*key, lines, limits[key[0]]) for key, lines in cells.items()]
+
+
+def time_limits(cells: Cells) -> dict[str, float | None]:
+    """Time at which an episode of each suite was broken off [s]; None where none hit its limit.
+
+    Tables that were not cleared, for whatever reason, count as hits of the limit that their lines give.
+    """
+    limits: dict[str, float | None] = {suite: None for suite, _, _ in cells}
+    for (suite, _, _), lines in cells.items():
+        for line in lines:
+            hit = line.get("time_limit_s") if not line["success"] else None
+            if hit is None and line["outcome"] == "timeout":
+                hit = line["sim_time_s"]
+            before = limits[suite]
+            if hit is not None:
+                limits[suite] = hit if before is None else min(before, hit)
+    return limits
+
+
+def time_of(line: Mapping[str, Any]) -> float:
+    """Simulated time of an episode [s]; a table that was not cleared would have taken its limit or more."""
+    unfinished = not line["success"] and line.get("time_limit_s") is not None
+    return float(line["time_limit_s"] if unfinished else line["sim_time_s"])
 
 
 def _cell(
@@ -56,7 +74,8 @@ def _cell(
     played = [line for line in lines if line["outcome"] != ERROR]
     n, successes = len(played), sum(bool(line["success"]) for line in played)
     low, high = wilson_interval(successes, n)
-    times = [line["sim_time_s"] for line in played]
+    times = [time_of(line) for line in played]
+    middle, middle_low, middle_high = median_interval(times)
     mean, mean_low, mean_high = mean_interval(restricted(times, limit))
     objects: dict[str, dict[str, int]] = {}
     for line in played:
@@ -64,7 +83,7 @@ def _cell(
         counts["n"] += 1
         counts["successes"] += bool(line["success"])
     values = {key: [line[key] for line in played if line.get(key) is not None] for key in MOTION}
-    reflexes = [line["reflex"]["limit"] for line in played if line["reflex"] is not None]
+    reflexes = [stop["limit"] for line in played for stop in stops_of(line)]
     return {
         "suite": suite,
         "detector": detector,
@@ -75,7 +94,9 @@ def _cell(
         "rate": successes / n if n else None,
         "wilson_low": low,
         "wilson_high": high,
-        "median_time_s": median(times) if times else None,
+        "median_time_s": middle if times else None,
+        "median_time_low": middle_low,
+        "median_time_high": middle_high,
         "mean_time_s": mean,
         "mean_time_low": mean_low,
         "mean_time_high": mean_high,
@@ -86,6 +107,28 @@ def _cell(
         "objects": dict(sorted(objects.items())),
         "motion": {key: median(numbers) for key, numbers in values.items() if numbers},
         "worst_singular_value": min(values["min_singular_value"], default=None),
+        "clearing": _clearing([line for line in played if "picks" in line]),
+    }
+
+
+def stops_of(line: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """All protective stops of an episode."""
+    if "stops" in line:
+        return list(line["stops"])
+    return [] if line["reflex"] is None else [line["reflex"]]
+
+
+def _clearing(lines: list[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """What became of attempts and objects where tables were to be cleared; None where none were."""
+    if not lines:
+        return None
+    failures = Counter(
+        pick["outcome"] for line in lines for pick in line["picks"] if pick["outcome"] != "success"
+    )
+    return {
+        "attempts": sum(len(line["picks"]) for line in lines),
+        "failed_attempts": dict(sorted(failures.items())),
+        **{key: sum(len(line[key]) for line in lines) for key in ("in_basket", "knocked_off", "left")},
     }
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.plan import Plan, Task
-from mpgrasp.bench.player import EpisodeError, Line, Player, RunEpisode, error_line
+from mpgrasp.bench.player import EpisodeError, Games, Line, Player, error_line
 from mpgrasp.exceptions import MpgraspError
 
 HANG_AFTER = 600.0
@@ -42,7 +42,7 @@ class WorkerPool:
     """Plays tasks in processes; implements `runner.Crew`."""
 
     def __init__(
-        self, plan: Plan, size: int, run_episode: RunEpisode, *, hang_after: float, attempts: int
+        self, plan: Plan, size: int, run_episode: Games, *, hang_after: float, attempts: int
     ) -> None:
         self._plan, self._size, self._run_episode = plan, size, run_episode
         self._hang_after, self._attempts = hang_after, attempts
@@ -122,7 +122,7 @@ class WorkerPool:
 class _Worker:
     """The run's end of one worker process."""
 
-    def __init__(self, plan: Plan, run_episode: RunEpisode, hang_after: float) -> None:
+    def __init__(self, plan: Plan, run_episode: Games, hang_after: float) -> None:
         self.connection, theirs = _context.Pipe()
         self._log, name = tempfile.mkstemp(prefix="mpgrasp-worker-", suffix=".log")
         self._log_name = Path(name)
@@ -181,13 +181,11 @@ def _cause(exitcode: int | None) -> str:
     return f"was killed by signal {-exitcode}"
 
 
-def _work(
-    connection: Connection, plan: Plan, run_episode: RunEpisode, log_name: str, hang_after: float
-) -> None:
+def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str, hang_after: float) -> None:
     """What a worker process does until the pipe ends."""
     # Ctrl-C reaches the whole process group; the parent decides what becomes of its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    threading.Thread(target=die_with_parent, daemon=True).start()
     with Path(log_name).open("w") as log:
         # open in both processes by now; unnamed, it cannot be left behind
         Path(log_name).unlink(missing_ok=True)
@@ -214,7 +212,7 @@ def _work(
             faulthandler.cancel_dump_traceback_later()
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """A killed parent cannot end its workers, and they would wait for work for ever."""
     parent = multiprocessing.parent_process()
     assert parent is not None

@@ -1,0 +1,139 @@
+"""`python -m mpgrasp.bench report DIR`: report.html, which opens offline, and report.md for pull requests."""
+
+from __future__ import annotations
+
+import os
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from mpgrasp.bench.command_line import Parser
+from mpgrasp.bench.document import Block, Paragraph, Section, to_html, to_markdown
+from mpgrasp.bench.hypotheses import evaluate
+from mpgrasp.bench.paper_tables import hypothesis_blocks, pair_table, paper_tables
+from mpgrasp.bench.report_gallery import (
+    film_blocks,
+    motion_pictures,
+    outcome_pictures,
+    read_traces,
+    thickness_blocks,
+)
+from mpgrasp.bench.report_tables import (
+    card_blocks,
+    failure_blocks,
+    motion_table,
+    object_blocks,
+    overview_table,
+    run_blocks,
+)
+from mpgrasp.bench.run_reading import Runs, find_runs
+from mpgrasp.bench.summary import paired_tests, summarise
+from mpgrasp.exceptions import OutputError
+
+FILES = ("report.html", "report.md")
+
+_EPILOG = """\
+DIR is the folder of a run, or one whose folders are runs: they are put into one report then, and their
+cells are compared over the episodes that both played. A run writes its report when it ends; this command
+makes it again, and plays nothing.
+
+exit code: 0 written, 2 unusable input or output.
+"""
+
+
+def make_parser() -> Parser:
+    """The command line's options."""
+    parser = Parser(
+        prog="python -m mpgrasp.bench report",
+        description="Write DIR/report.html and DIR/report.md from what runs have left.",
+        epilog=_EPILOG,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="folder of a run, or of runs")
+    parser.add_argument("--out", metavar="OUT", type=Path, help="one report of all of them, in this folder")
+    return parser
+
+
+def main(command: Sequence[str]) -> int:
+    """Write the reports, print where they are and return the exit code.
+
+    Raises:
+        MpgraspError: runs that cannot be read, or a folder that cannot be written.
+    """
+    arguments = make_parser().parse_args(command)
+    if arguments.out:
+        print(f"Report: {write_report(arguments.folders, arguments.out)}")
+        return 0
+    for folder in arguments.folders:
+        print(f"Report: {write_report([folder], folder)}")
+    return 0
+
+
+def write_report(folders: Sequence[Path], out: Path) -> Path:
+    """Write report.html and report.md of some runs into a folder; returns the path of the first.
+
+    Raises:
+        OutputError: a run that cannot be read, or a file that cannot be written.
+        ConfigError: a cell that two runs have played.
+    """
+    title, sections = make_report(find_runs(folders))
+    for name, text in zip(FILES, (to_html(title, sections), to_markdown(title, sections)), strict=True):
+        _replace(out / name, text)
+    return out / FILES[0]
+
+
+def make_report(runs: Runs) -> tuple[str, list[Section]]:
+    """Title and sections of the report, which say the same in HTML and Markdown."""
+    rows = {(row["suite"], row["detector"], row["controller"]): row for row in summarise(runs.lines)}
+    tests = paired_tests(runs.lines)
+    traced, troubles = read_traces(runs)
+    n, errors = sum(row["n"] for row in rows.values()), sum(row["errors"] for row in rows.values())
+    failures = n - sum(row["successes"] for row in rows.values())
+    said = (
+        f"Suites: {len(runs.suites)}, cells: {len(rows)}, episodes: {n}, failures: {failures}, "
+        f"episodes that could not be played: {errors}."
+    )
+    if any(not run.complete for run in runs.runs):
+        said += " Not all is there yet: a run is not complete."
+    pairs: list[Block] = [pair_table(tests)] if tests else [Paragraph(text="No two cells of one suite.")]
+    sections = [
+        Section(
+            title="Results", blocks=[Paragraph(text=said), overview_table(rows), *object_blocks(runs, rows)]
+        ),
+        Section(title="The paper's tables", blocks=paper_tables(runs, rows, tests)),
+        Section(title="The paper's orderings", blocks=hypothesis_blocks(evaluate(runs.cells))),
+        Section(title="Paired tests", blocks=pairs),
+        Section(title="Success and time", blocks=outcome_pictures(runs, rows)),
+        Section(
+            title="How the arm moved",
+            blocks=[
+                motion_table(rows),
+                *(Paragraph(text=f"A trace cannot be read: {trouble}") for trouble in troubles),
+                *motion_pictures(runs, traced),
+            ],
+        ),
+        Section(title="Thin objects", blocks=thickness_blocks()),
+        Section(title="Filmstrips", blocks=film_blocks(runs, traced)),
+        Section(title="Failures", blocks=failure_blocks(runs)),
+        Section(title="Runs", blocks=run_blocks(runs)),
+        Section(title="Physics card", blocks=card_blocks(runs)),
+    ]
+    return f"mpgrasp: {', '.join(runs.suites) or 'no episodes'}", sections
+
+
+def _replace(file: Path, text: str) -> None:
+    """Replace a file as a whole."""
+    temporary = file.with_name(f".{file.name}.tmp")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, file)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise OutputError(
+            f"a report cannot be written ({error.strerror})",
+            got=str(file),
+            allowed="a directory one may write to",
+        ) from error

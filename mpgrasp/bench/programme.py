@@ -1,0 +1,58 @@
+"""Programmes: several suites in one run, each cell playing all of them, such as all trials of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mpgrasp.bench.plan import Cell, every_cell
+from mpgrasp.bench.suite import Suite, load_suite, suite_names
+from mpgrasp.exceptions import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Programme:
+    """What stands on the command line in the place of one suite."""
+
+    title: str
+    suites: tuple[str, ...]
+    """In the order in which they are played, each with as many episodes as it declares."""
+    detectors: tuple[str, ...]
+    controllers: tuple[str, ...]
+    references: tuple[Cell, ...]
+    """Played beside every detector with every controller, unless the command line names others."""
+
+    def cells(
+        self, detectors: Sequence[str] | None = None, controllers: Sequence[str] | None = None
+    ) -> tuple[Cell, ...]:
+        """Who plays; if detectors or controllers are given, they replace all of the programme's."""
+        cells = every_cell(detectors or self.detectors, controllers or self.controllers)
+        return cells if detectors or controllers else (*cells, *self.references)
+
+
+PROGRAMMES: dict[str, Programme] = {
+    "paper": Programme(
+        title="The paper's physical trials: Tables III, IV, V and VI",
+        suites=("single", "unseen", "thin", "stacked"),
+        detectors=("ggcnn2", "tfgrasp", "dhrnet"),
+        controllers=("mvp", "mppc"),
+        # the ceiling, and the floor: one look and no closed loop
+        references=(Cell("oracle", "mppc"), Cell("dhrnet", "open_loop")),
+    ),
+}
+"""Programmes by name."""
+
+
+def load_suites(name: str) -> tuple[Suite, ...]:
+    """The suites of a programme, or the one suite of that name or path.
+
+    Raises:
+        ConfigError: no such programme or suite, or a declaration that cannot be used.
+    """
+    if name in PROGRAMMES:
+        return tuple(load_suite(suite) for suite in PROGRAMMES[name].suites)
+    known = suite_names()
+    if name not in known and not name.endswith(".toml"):
+        allowed = [*known, *PROGRAMMES, "a path that ends in .toml"]
+        raise ConfigError("unknown suite", got=name, allowed=allowed)
+    return (load_suite(name),)
