@@ -85,7 +85,11 @@ def configuration(plan: Plan, player: Player) -> dict[str, Any]:
 
 def suite_card(suite: Suite) -> dict[str, Any]:
     """A suite as plain values; an object's mesh is given by the hash of its pieces."""
-    card: dict[str, Any] = plain(replace(suite, scenes=tuple(replace(s, objects=()) for s in suite.scenes)))
+    # names in place of meshes, whose vertices would fill pages
+    named = (
+        replace(s, objects=tuple(getattr(item, "name", item) for item in s.objects)) for s in suite.scenes
+    )
+    card: dict[str, Any] = plain(replace(suite, scenes=tuple(named)))
     for scene, written in zip(suite.scenes, card["scenes"], strict=True):
         written["objects"] = [_object_card(item) for item in scene.objects]
     return card

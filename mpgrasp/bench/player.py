@@ -9,7 +9,6 @@ from mpgrasp.bench.plan import Plan, Task
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.suite import episode_seed
 from mpgrasp.bench.trace import TraceRecorder
-from mpgrasp.camera import has_colour
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
 from mpgrasp.recording import NullRecorder, Recorder
@@ -55,6 +54,8 @@ class Player:
         Raises:
             ConfigError: a detector reads colour, and the camera has none.
         """
+        from mpgrasp.camera import has_colour
+
         for name, detector in self.detectors.items():
             if reads_colour(detector) and not has_colour(self.plan.camera):
                 raise ConfigError(
