@@ -17,7 +17,7 @@ from mpgrasp.bench.plan import Cell, Plan
 from mpgrasp.bench.programme import PROGRAMMES, Programme, load_suites
 from mpgrasp.bench.report import print_table
 from mpgrasp.bench.suite import load_suite, parse_suite, suite_names
-from mpgrasp.bench.summary import summarise, time_limits
+from mpgrasp.bench.summary import by_cell, summarise, time_limits
 from mpgrasp.episode_config import ClearingConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.object_model import ObjectModel
@@ -133,7 +133,7 @@ def test_a_clearing_that_came_to_no_end_counts_as_its_time_limit() -> None:
     assert cell["mean_time_s"] == pytest.approx((200 + 300 + 900) / 3)
     assert (cell["median_time_s"], cell["successes"]) == (300.0, 2)
     assert cell["median_time_low"] <= 300.0 <= cell["median_time_high"]
-    assert time_limits({("stacked", "d", "c"): lines[:2]}) == {"stacked": None}
+    assert time_limits(by_cell(lines[:2])) == {"stacked": None}
 
 
 def test_attempts_and_objects_add_up_over_clearings_and_all_stops_count() -> None:

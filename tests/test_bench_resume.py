@@ -83,7 +83,7 @@ def test_resuming_takes_the_whole_command_too_and_a_finished_run_is_left_as_it_i
         (["--seed", "1"], "seed: 0 there, 1 here"),
         (["--episodes", "9"], "episodes: 6 there, 9 here"),
         (["--no-noise"], "episode.noise: true there, false here"),
-        (["--controller", "fakes:FakeController"], "controllers: "),
+        (["--controller", "fakes:FakeController"], "cells: "),
     ],
 )
 def test_another_configuration_is_refused_by_name_and_nothing_changes(
@@ -302,7 +302,7 @@ def test_a_cap_ends_what_would_never_be_narrow_enough(
 ) -> None:
     assert main(command(tmp_path, "--until-ci", "1", "--max-episodes", "12", episodes=5)) == 0
     assert {cell["n"] for cell in cells_of(tmp_path)} == {12}
-    assert "have not brought every interval below 1 points" in capsys.readouterr().err
+    assert "have not brought every interval of thin below 1 points" in capsys.readouterr().err
 
 
 def test_until_ci_ends_the_same_after_an_interruption(fake_world: object, tmp_path: Path) -> None:

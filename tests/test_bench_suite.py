@@ -58,7 +58,7 @@ def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
     ("declared", "message"),
     [
         ({"scene": {}}, "no title"),
-        (MINIMAL | {"objects": ["key"]}, "unknown key.*'objects'.*title, trial, trials, scene, turns, episode"),
+        (MINIMAL | {"objects": ["key"]}, "unknown key.*'objects'.*trial, trials, scene, turns, episode"),
         (MINIMAL | {"scene": {"cloth": 1}}, "unknown key.*'cloth'.*cloth_unevenness"),
         (MINIMAL | {"turns": [{"cloth": 1}]}, "unknown key.*'cloth'"),
         (MINIMAL | {"turns": []}, "no scene"),

@@ -12,16 +12,18 @@ from torch import nn
 import mpgrasp
 from mpgrasp.detectors.cost import document, flops, parameters
 from mpgrasp.detectors.networks import build_network
+from mpgrasp.detectors.tfgrasp import TFGrasp
 
 DOCUMENT = Path(mpgrasp.__file__).parents[1] / "docs" / "networks.md"
 
 
 def by_hand(network: nn.Module, x: torch.Tensor) -> int:
     """2 x multiply-adds of all convolutions and linear layers, from the shapes that go through them."""
-    total = 0
+    total, called = 0, set()
 
     def count(layer: nn.Module, args: tuple[torch.Tensor], y: torch.Tensor) -> None:
         nonlocal total
+        called.add(layer)
         weight = layer.weight
         assert isinstance(weight, torch.Tensor)
         # a weight is used once for each place of the output, or of the input if that is the smaller one
@@ -34,6 +36,10 @@ def by_hand(network: nn.Module, x: torch.Tensor) -> int:
             layer.register_forward_hook(count)
     with torch.inference_mode():
         network.eval()(x)
+    if not isinstance(network, TFGrasp):
+        side = x.shape[-1] // 2  # heads computed as one make no calls of their own; they work at half size
+        heads = [layer for name, layer in network.named_children() if name.endswith("_output")]
+        total += sum(2 * head.weight.numel() * side**2 for head in heads if head not in called)  # type: ignore
     return total
 
 

@@ -204,6 +204,21 @@ def test_the_watcher_sees_the_red_stick(simulation: Any, backend: str) -> None:
     assert np.ptp(picture[20, 20]) < 40
 
 
+def test_a_long_film_is_thinned_out_while_it_is_made(
+    simulation: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mpgrasp.film._MOST", 5)
+    recorder = FilmRecorder(tmp_path / "film.gif", config=FilmConfig(backend="ray"))
+    start = simulation.time
+    _play(recorder, simulation, ticks=14)
+    assert len(recorder.pictures) == len(recorder.times) <= 6  # and the outcome
+    assert recorder.times[0] - start < 0.2
+    assert recorder.times[-1] - start > 1.0
+    steps = np.diff(recorder.times[:-2])  # the reflex of the last tick is shown at once
+    assert steps == pytest.approx(steps[0], abs=0.02)
+    assert steps[0] > 0.3
+
+
 def test_webp_films_are_written_too(simulation: Any, tmp_path: Path) -> None:
     film = tmp_path / "film.webp"
     _play(FilmRecorder(film, config=FilmConfig(backend="ray")), simulation)
