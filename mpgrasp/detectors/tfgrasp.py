@@ -26,8 +26,8 @@ PATCH = 4
 """Side of the patches that become tokens [px]."""
 MASKED = -1e4
 """Added to scores of tokens that must not see each other; their softmax is zero, not a slow denormal."""
-LINEAR_STD = 0.02
-"""Spread of first weights of linear layers and position biases."""
+BIAS_STD = 0.02
+"""Spread of first position biases."""
 HEAD_STD = 0.02
 """Of the heads' initial weights."""
 
@@ -95,7 +95,8 @@ class TFGrasp(nn.Module):
         self.pixels = _Expand(c.embed, PATCH, c.embed)
         for module in self.modules():
             if isinstance(module, nn.Linear):
-                nn.init.trunc_normal_(module.weight, std=LINEAR_STD)
+                # layers of 48 to 384 channels need more than the 0.02 of large ones, or all tokens stay alike
+                nn.init.xavier_uniform_(module.weight)
                 if module.bias is not None:
                     nn.init.zeros_(module.bias)
         for name in HEADS:
@@ -186,7 +187,7 @@ class _Attention(nn.Module):
         self.qkv = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
         self.bias = nn.Parameter(torch.empty(heads, (2 * window - 1) ** 2))
-        nn.init.trunc_normal_(self.bias, std=LINEAR_STD)
+        nn.init.trunc_normal_(self.bias, std=BIAS_STD)
         self.register_buffer("offsets", _offsets(window), persistent=False)
         self.offsets: Tensor
 
