@@ -271,6 +271,8 @@ def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path, workers: int) -> No
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # who runs the tests in the background has them ignore it, and so would the command
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     lines = out / "episodes.jsonl"
