@@ -171,21 +171,11 @@ def _study(command: Sequence[str]) -> None:
     rows = summarise(entries, sizes)
     about = study.about(
         "run_time", command, rounds=options.rounds, threads=options.threads, seed=options.seed,
-        processor=processor(), weights_sha256=study.weights_hashes(n for n in names if n != WIDE),
+        weights_sha256=study.weights_hashes(n for n in names if n != WIDE),
     )  # fmt: skip
     results = {"limit_ms": LIMIT_MS, "rows": rows}
     study.publish(options.out, "run-time", about, results, rows, draw(rows))
     print(f"{table(rows)}\n{options.threads} threads. Results: {options.out}")
-
-
-def processor() -> str:
-    """The processor's name, as far as the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:
-        return "unknown"
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, "unknown")
 
 
 def main(command: Sequence[str] | None = None) -> int:
