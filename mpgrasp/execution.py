@@ -72,11 +72,16 @@ def execute_grasp(
     Raises:
         ConfigError: a grasp that is not finite.
     """
-    if not np.all(np.isfinite([*grasp.position, grasp.angle, grasp.width])):
-        raise ConfigError("grasp is not finite", got=(list(grasp.position), grasp.angle, grasp.width))
+    check_finite(grasp)
     told = None if on_tick is None else lambda phase: on_tick(phase, driver)
     yaw = reachable_yaw(driver, grasp)
     return Execution(driver, grasp, config or ExecutionConfig(), yaw=yaw, on_tick=told).play()
+
+
+def check_finite(grasp: Grasp) -> None:
+    """Raise ConfigError for a grasp that is not finite."""
+    if not np.all(np.isfinite([*grasp.position, grasp.angle, grasp.width])):
+        raise ConfigError("grasp is not finite", got=(list(grasp.position), grasp.angle, grasp.width))
 
 
 class Execution:

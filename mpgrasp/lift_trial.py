@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp import panda
-from mpgrasp.exceptions import ConfigError
-from mpgrasp.execution import Execution
+from mpgrasp.execution import Execution, check_finite
 from mpgrasp.execution_config import ExecutionConfig
 from mpgrasp.free_gripper import FreeGripper
 from mpgrasp.geometry import FloatArray
@@ -69,8 +68,7 @@ class LiftRig:
         Raises:
             ConfigError: a grasp that is not finite.
         """
-        if not np.all(np.isfinite([*grasp.position, grasp.angle, grasp.width])):
-            raise ConfigError("grasp is not finite", got=(list(grasp.position), grasp.angle, grasp.width))
+        check_finite(grasp)
         self._hand.reset()
         return _Trial(HandDriver(self._hand), grasp, self.config).lift_result()
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpgrasp.bench.suite import Suite
 from mpgrasp.detectors import RUNTIMES
@@ -39,23 +39,18 @@ def every_cell(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Ce
     return tuple(Cell(detector, controller) for detector in detectors for controller in controllers)
 
 
-class EpisodeKey(NamedTuple):
-    """What tells one line of a run from all others."""
+class Task(NamedTuple):
+    """One episode of one cell: what tells one line of a run from all others."""
 
     suite: str
     episode: int
     detector: str
     controller: str
 
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """One episode of one cell."""
-
-    suite: str
-    episode: int
-    detector: str
-    controller: str
+    @classmethod
+    def of(cls, line: Mapping[str, Any]) -> Task:
+        """The task that a line of episodes.jsonl is about."""
+        return cls(*(line[name] for name in cls._fields))
 
     @property
     def stem(self) -> str:
@@ -158,7 +153,3 @@ class Plan:
             for episode in range(start, stop)
             for cell in self.cells
         ]
-
-    def key(self, task: Task) -> EpisodeKey:
-        """Key of the task's line."""
-        return EpisodeKey(task.suite, task.episode, task.detector, task.controller)

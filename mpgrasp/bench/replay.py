@@ -15,7 +15,7 @@ from mpgrasp.bench.description import command_of, configuration
 from mpgrasp.bench.plan import Cell, Plan, Task
 from mpgrasp.bench.player import ERROR, Line, Player
 from mpgrasp.bench.provenance import provenance
-from mpgrasp.bench.run import key_of, make_plan
+from mpgrasp.bench.run import make_plan
 from mpgrasp.bench.run_files import read_lines, read_run
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.plain import difference, plain
@@ -101,7 +101,7 @@ def _one_episode(plan: Plan, arguments: Any) -> tuple[Plan, Task]:
 
 
 def _recorded_line(folder: Path, plan: Plan, task: Task) -> Line:
-    lines = [line for line in read_lines(folder).lines if key_of(line) == plan.key(task)]
+    lines = [line for line in read_lines(folder).lines if Task.of(line) == task]
     if not lines:
         raise ConfigError(f"the run has no {task}", got=str(folder), allowed="an episode that was played")
     return lines[-1]

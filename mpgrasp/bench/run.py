@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mpgrasp.bench.description import describe
 from mpgrasp.bench.interrupts import interrupts_wait
-from mpgrasp.bench.plan import EpisodeKey, Plan, Task, every_cell
+from mpgrasp.bench.plan import Plan, Task, every_cell
 from mpgrasp.bench.player import ERROR, EpisodeError, Line, Player
 from mpgrasp.bench.plugins import check_name, controller_names, detector_names, parse_weights
 from mpgrasp.bench.programme import PROGRAMMES, load_suites
@@ -150,17 +150,15 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Pro
     """
     before = directory.episodes()
     progress.start(before)
-    played = {key_of(line) for line in before if line["outcome"] != ERROR}
-    stems: dict[EpisodeKey, str] = {}
+    played = {Task.of(line) for line in before if line["outcome"] != ERROR}
 
     def sink(line: Line) -> None:
         with interrupts_wait():
-            directory.append(line, stems[key_of(line)])
+            directory.append(line, Task.of(line).stem)
             progress.add(line)
 
     def play(tasks: list[Task]) -> None:
-        stems.update({plan.key(task): task.stem for task in tasks})
-        crew.play([task for task in tasks if plan.key(task) not in played], sink, progress.note)
+        crew.play([task for task in tasks if task not in played], sink, progress.note)
 
     if plan.until_ci is None:
         progress.expect(len(plan.tasks()))
@@ -201,9 +199,9 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
         suite.name: max((line["episode"] for line in lines if line["suite"] == suite.name), default=-1)
         for suite in plan.suites
     }
-    order = [plan.key(t) for suite in plan.suites for t in plan.tasks_of(suite, 0, 1 + last[suite.name])]
+    order = [task for suite in plan.suites for task in plan.tasks_of(suite, 0, 1 + last[suite.name])]
     rank = {key: k for k, key in enumerate(order)}
-    lines.sort(key=lambda line: rank.get(key_of(line), len(rank)))
+    lines.sort(key=lambda line: rank.get(Task.of(line), len(rank)))
     cells, tests = summarise(lines), paired_tests(lines)
     errors = sum(cell["errors"] for cell in cells)
     try:
@@ -227,8 +225,3 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
         )
         code = code or EXIT_BROKEN
     return code
-
-
-def key_of(line: Line) -> EpisodeKey:
-    """Which episode a line is about."""
-    return EpisodeKey(*(line[name] for name in EpisodeKey._fields))

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from mpgrasp.bench.plan import EpisodeKey
+from mpgrasp.bench.plan import Task
 from mpgrasp.bench.player import ERROR, Line
 from mpgrasp.bench.run_files import EPISODES, RUN, read_lines, read_run
 from mpgrasp.exceptions import OutputError
@@ -138,14 +138,14 @@ class RunDirectory:
         Raises:
             OutputError: a line that is not JSON.
         """
-        lines: dict[EpisodeKey, Line] = {}
+        lines: dict[Task, Line] = {}
         for line in read_lines(self.path).lines:
-            key = EpisodeKey(*(line[name] for name in EpisodeKey._fields))
+            key = Task.of(line)
             if key not in lines or line.get("outcome") != ERROR:
                 lines[key] = line
         return list(lines.values())
 
-    def settle(self, order: Iterable[EpisodeKey]) -> list[Line]:
+    def settle(self, order: Iterable[Task]) -> list[Line]:
         """Put the lines into an order, one per episode, and return them; those left over come last.
 
         Raises:
@@ -153,7 +153,7 @@ class RunDirectory:
         """
         rank = {key: k for k, key in enumerate(order)}
         lines = self.episodes()
-        lines.sort(key=lambda line: rank.get(EpisodeKey(*(line[n] for n in EpisodeKey._fields)), len(rank)))
+        lines.sort(key=lambda line: rank.get(Task.of(line), len(rank)))
         try:
             self._replace(EPISODES, "".join(one_line(line) for line in lines))
         except OSError as error:

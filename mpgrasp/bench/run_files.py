@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpgrasp.bench.plan import EpisodeKey
+from mpgrasp.bench.plan import Task
 from mpgrasp.exceptions import OutputError
 
 RUN, EPISODES = "run.json", "episodes.jsonl"
@@ -79,5 +79,5 @@ def _parse(text: bytes) -> dict[str, Any] | None:
         line = json.loads(text)
     except ValueError:
         return None
-    whole = isinstance(line, dict) and text.endswith(b"\n") and set(EpisodeKey._fields) <= set(line)
+    whole = isinstance(line, dict) and text.endswith(b"\n") and set(Task._fields) <= set(line)
     return line if whole else None

@@ -21,9 +21,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks import build_network
-from mpgrasp.detectors.weights import WIDTH_PX, NetworkWeights, save_weights
+from mpgrasp.detectors.weights import NetworkWeights, save_weights, width_unit
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.training.batches import Batches
 from mpgrasp.training.card import training_card
@@ -91,7 +90,7 @@ class Trainer:
             settings=settings,
             input=config.input,
             # a width output of 1 is the same share of every image
-            width_px=WIDTH_PX * config.input.size / NETWORK_SIZE,
+            width_px=width_unit(config.input.size),
         )
         network.to(device=self.device)
         self.network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
