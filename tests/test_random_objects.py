@@ -19,12 +19,14 @@ from mpgrasp.training.solid_families import SOLID_FAMILIES
 from mpgrasp.training.thin_families import THIN_FAMILIES
 
 NAMES = [name for names in OBJECT_SETS.values() for name in names]
+STICKS = [(0.060, 0.018, mm / 1000) for mm in (2, 3, 4, 5, 6, 8, 10, 12)]
+"""Of the study of thickness, which no catalogue holds."""
 
 
 def test_no_training_object_is_within_reach_of_an_evaluation_object() -> None:
     rng = np.random.default_rng(0)
-    known = np.sort([load_object(name).size for name in NAMES], axis=1)
-    for k in range(400):
+    known = np.sort([*(load_object(name).size for name in NAMES), *STICKS], axis=1)
+    for k in range(1600):
         size = np.sort(random_object(rng, f"train_{k}", thin=k % 2 == 0).size)
         assert (np.abs(size / known - 1).max(axis=1) >= LIKENESS).all()
 
@@ -34,6 +36,14 @@ def test_every_evaluation_object_resembles_itself_however_it_is_turned(name: str
     size = load_object(name).size
     assert resembles_evaluation_object(size)
     assert resembles_evaluation_object(np.roll(size, 1) * 1.1)
+
+
+@pytest.mark.parametrize("size", STICKS)
+def test_objects_that_a_suite_declares_itself_are_kept_out_like_the_catalogue(
+    size: tuple[float, ...],
+) -> None:
+    assert resembles_evaluation_object(size)
+    assert resembles_evaluation_object(np.roll(size, 1) * 0.9)
 
 
 def test_thin_objects_are_thin_and_all_objects_are_sane() -> None:

@@ -1,7 +1,8 @@
 """Random parametric objects and scenes to train on.
 
 They are drawn from continuous families of primitives and hulls, never from the catalogue, and anything
-that comes close to the size of an evaluation object is drawn again: training and evaluation stay apart.
+that comes close to the size of an object of the catalogue or of a shipped suite is drawn again: training
+and evaluation stay apart.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mpgrasp.bench.suite import load_suite, suite_names
 from mpgrasp.geometry import FloatArray
 from mpgrasp.object_model import ObjectModel
 from mpgrasp.objects import OBJECT_SETS, load_object
@@ -104,8 +106,11 @@ def resembles_evaluation_object(size: ArrayLike) -> bool:
 
 @cache
 def _evaluation_sizes() -> FloatArray:
-    """(n, 3) sorted edges of the catalogue's bounding boxes [m]."""
-    return np.array([np.sort(load_object(name).size) for names in OBJECT_SETS.values() for name in names])
+    """(n, 3) sorted edges of the bounding boxes of the catalogue's and all shipped suites' objects [m]."""
+    catalogue: list[str | ObjectModel] = [name for names in OBJECT_SETS.values() for name in names]
+    declared = [o for name in suite_names() for scene in load_suite(name).scenes for o in scene.objects]
+    models = [load_object(o) if isinstance(o, str) else o for o in catalogue + declared]
+    return np.unique([np.sort(model.size) for model in models], axis=0)
 
 
 def _pick(rng: np.random.Generator, thin: bool) -> Family:
