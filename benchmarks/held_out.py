@@ -7,7 +7,8 @@ detector sees the same noisy views. Its best grasp of each is judged against the
 metric) and executed by the free-flying gripper in the true scene. Accuracy is that of views with a
 labelled grasp.
 Calibration holds the best grasp's quality against its success, over all views in which a grasp was found, and
-the same trials choose the threshold of MP-PC's exist_peak(); the rule stands in reliability.py.
+the same trials choose the threshold of MP-PC's exist_peak(), for each detector and for all of them together;
+the rule stands in reliability.py.
 """
 
 from __future__ import annotations
@@ -230,7 +231,7 @@ def _draw_accuracy(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def analyse(lines: Sequence[Line], seed: int) -> dict[str, Any]:
-    """All results: accuracy, McNemar tests, and calibration and threshold by detector."""
+    """All results: accuracy, McNemar tests, calibration and threshold by detector, and one for all."""
     own = by_detector(lines)
     return {
         "accuracy": accuracy(lines),
@@ -239,6 +240,7 @@ def analyse(lines: Sequence[Line], seed: int) -> dict[str, Any]:
         "thresholds": {
             name: choose_threshold(group, np.random.default_rng(seed)) for name, group in own.items()
         },
+        "common_threshold": choose_threshold(lines, np.random.default_rng(seed)),
     }
 
 
@@ -249,15 +251,19 @@ def table(results: Mapping[str, Any]) -> str:
         texts = [study.percent(row[metric]) for metric in METRICS]
         lines.append(f"{row['detector']:>12} {row['group']:<8} {row['n']:>5}   " + "".join(texts))
     for name, found in results["calibration"].items():
-        chosen = results["thresholds"][name]
         error = f"ECE {found['ece']:.3f}, Brier {found['brier']:.3f}" if found["n"] else "no grasps"
-        careful = "none" if chosen["careful"] is None else f"{chosen['careful']['threshold']:.2f}"
-        lines.append(
-            f"{name:>12}: {error}; threshold {chosen['threshold']:.2f} "
-            f"[{chosen['low']:.2f}-{chosen['high']:.2f}], finds {100 * chosen['found']['rate']:.1f} %, "
-            f"false peaks {100 * chosen['false_peaks']['rate']:.1f} %; careful: {careful}"
-        )
+        lines.append(f"{name:>12}: {error}; {_threshold(results['thresholds'][name])}")
+    lines.append(f"{'together':>12}: {_threshold(results['common_threshold'])}")
     return "\n".join(lines)
+
+
+def _threshold(chosen: Mapping[str, Any]) -> str:
+    careful = "none" if chosen["careful"] is None else f"{chosen['careful']['threshold']:.2f}"
+    return (
+        f"threshold {chosen['threshold']:.2f} [{chosen['low']:.2f}-{chosen['high']:.2f}], "
+        f"finds {100 * chosen['found']['rate']:.1f} %, "
+        f"false peaks {100 * chosen['false_peaks']['rate']:.1f} %; careful: {careful}"
+    )
 
 
 def _study(command: Sequence[str]) -> None:

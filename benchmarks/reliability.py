@@ -66,7 +66,7 @@ def calibration(lines: Iterable[Line]) -> dict[str, Any]:
 
 
 def choose_threshold(lines: Sequence[Line], rng: np.random.Generator) -> dict[str, Any]:
-    """exist_peak()'s threshold for one detector, by the rule of this file's head.
+    """exist_peak()'s threshold for the trials of one detector or several, by the rule of this file's head.
 
     Keys: threshold, low and high (95 % by bootstrap over scenes); youden; at it found (right peaks that pass,
     of views with a labelled grasp), false_peaks (those that pass, of views without a right one) and

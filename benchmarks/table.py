@@ -12,47 +12,66 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 BEGIN, END = "<!-- results: python benchmarks/table.py --write -->", "<!-- end of results -->"
-COLUMNS = (
-    "suite", "detector", "controller", "n", "success %", "95 % interval", "median time [s]", "reflex stops",
-    "failures",
-)  # fmt: skip
+SUITES = ("single", "single-ycb", "unseen", "thin", "thin_variants", "stacked")
+"""Order of the columns; other suites come after these."""
+DETECTORS = ("oracle", "dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
+"""Order of the rows; other detectors come after these."""
+NOT_PLAYED = ""
 
 
-def rows() -> list[str]:
-    """One Markdown row per published cell, in the order of suite, detector, controller."""
-    cells = []
+def cells() -> list[dict]:
+    """All published cells, as in the summaries."""
+    found: list[dict] = []
     for path in sorted(RESULTS.glob("*/summary.json")):
         summary = json.loads(path.read_text(encoding="utf-8"))
         assert summary["complete"], f"{path} is the summary of an unfinished run"
-        cells += summary["cells"]
-    order = {"oracle": 0, "dhrnet": 1}
-    cells.sort(key=lambda c: (c["suite"], order.get(c["detector"], 9), c["detector"], c["controller"]))
-    return [_row(cell) for cell in cells]
+        found += summary["cells"]
+    return found
 
 
-def _row(cell: dict) -> str:
-    failures = ", ".join(f"{count} {cause}" for cause, count in sorted(cell["failures"].items())) or "none"
-    interval = f"{100 * cell['wilson_low']:.1f} - {100 * cell['wilson_high']:.1f}"
-    return _line(
-        cell["suite"],
-        cell["detector"],
-        cell["controller"],
-        cell["n"],
-        f"{100 * cell['rate']:.0f}",
-        interval,
-        f"{cell['median_time_s']:.1f}",
-        cell["reflex_stops"],
-        failures,
-    )
+def table() -> str:
+    """The whole Markdown table: a row per detector and controller, a column per suite, two per clearing."""
+    by_key = {(c["detector"], c["controller"], c["suite"]): c for c in cells()}
+    suites = sorted({suite for *_, suite in by_key}, key=lambda name: (_rank(name, SUITES), name))
+    methods = sorted({key[:2] for key in by_key}, key=lambda m: (_rank(m[0], DETECTORS), *m))
+    clearing = {
+        suite for *_, suite in by_key if any(c["clearing"] for k, c in by_key.items() if k[2] == suite)
+    }
+    head = ["detector", "controller"]
+    for suite in suites:
+        sizes = {c["n"] for key, c in by_key.items() if key[2] == suite}
+        assert len(sizes) == 1, f"cells of {suite} have different numbers of episodes: {sizes}"
+        what = " cleared" if suite in clearing else ""
+        head += [f"{suite}{what} %, n = {sizes.pop()}"] + [f"{suite}, time [s]"] * bool(what)
+    lines = [_line(*head), "|" + "---|" * len(head)]
+    for method in methods:
+        row = list(method)
+        for suite in suites:
+            cell = by_key.get((*method, suite))
+            row += [_rate(cell)] + [_time(cell)] * (suite in clearing)
+        lines.append(_line(*row))
+    return "\n".join(lines)
+
+
+def _rank(name: str, order: tuple[str, ...]) -> int:
+    return order.index(name) if name in order else len(order)
+
+
+def _rate(cell: dict | None) -> str:
+    if cell is None:
+        return NOT_PLAYED
+    low, high = (100 * cell[f"wilson_{end}"] for end in ("low", "high"))
+    return f"{100 * cell['rate']:.0f} ({low:.0f}-{high:.0f})"
+
+
+def _time(cell: dict | None) -> str:
+    if cell is None:
+        return NOT_PLAYED
+    return f"{cell['mean_time_s']:.0f} ({cell['mean_time_low']:.0f}-{cell['mean_time_high']:.0f})"
 
 
 def _line(*values: object) -> str:
     return "| " + " | ".join(str(value) for value in values) + " |"
-
-
-def table() -> str:
-    """The whole Markdown table."""
-    return "\n".join([_line(*COLUMNS), "|" + "---|" * len(COLUMNS), *rows()])
 
 
 def main() -> None:

@@ -126,6 +126,14 @@ def test_unknown_names_list_suites_and_programmes() -> None:
     assert not set(suite_names()) & set(PROGRAMMES)
 
 
+def test_a_programme_can_be_played_in_parts_that_keep_its_order() -> None:
+    assert [suite.name for suite in load_suites("paper", ["thin", "unseen"])] == ["unseen", "thin"]
+    with pytest.raises(ConfigError, match=r"unknown suite of paper; got 'thick'; allowed: .*thin"):
+        load_suites("paper", ["thick"])
+    with pytest.raises(ConfigError, match="--suites with a single suite; got 'thin'; allowed: paper"):
+        load_suites("thin", ["thin"])
+
+
 def test_a_clearing_that_came_to_no_end_counts_as_its_time_limit() -> None:
     lines = [clearing(0, time=200.0), clearing(1, time=300.0), clearing(2, success=False, time=50.0)]
     (cell,) = summarise(lines)

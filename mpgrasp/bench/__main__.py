@@ -23,6 +23,7 @@ examples:
   python -m mpgrasp.bench unseen --detector my_net:MyDetector --weights my_net.pt --record 3
   python -m mpgrasp.bench thin --episodes 50 --until-ci 10
   python -m mpgrasp.bench paper --workers 2
+  python -m mpgrasp.bench paper --suites unseen,thin --episodes 100
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
@@ -65,6 +66,7 @@ def make_parser() -> argparse.ArgumentParser:
         help=f"{', '.join(suite_names())}, {', '.join(PROGRAMMES)} (all of Tables III to VI), or a path to a "
         "declaration.toml; may be left out with --resume",
     )
+    add("--suites", metavar="S[,S]", help="paper: play these of its suites alone (default: all)")
     add(
         "--detector",
         metavar="D[,D]",

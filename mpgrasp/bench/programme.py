@@ -43,14 +43,23 @@ PROGRAMMES: dict[str, Programme] = {
 """Programmes by name."""
 
 
-def load_suites(name: str) -> tuple[Suite, ...]:
-    """The suites of a programme, or the one suite of that name or path.
+def load_suites(name: str, only: Sequence[str] | None = None) -> tuple[Suite, ...]:
+    """The suites of a programme, in its order, or the one suite of that name or path.
+
+    Args:
+        name: of a programme or a suite, or a path to a declaration.
+        only: those suites of a programme that are wanted; None: all of them.
 
     Raises:
         ConfigError: no such programme or suite, or a declaration that cannot be used.
     """
     if name in PROGRAMMES:
-        return tuple(load_suite(suite) for suite in PROGRAMMES[name].suites)
+        suites = PROGRAMMES[name].suites
+        if only is not None and (not only or not set(only) <= set(suites)):
+            raise ConfigError(f"unknown suite of {name}", got=",".join(only), allowed=suites)
+        return tuple(load_suite(suite) for suite in suites if only is None or suite in only)
+    if only is not None:
+        raise ConfigError("--suites with a single suite", got=name, allowed=tuple(PROGRAMMES))
     known = suite_names()
     if name not in known and not name.endswith(".toml"):
         allowed = [*known, *PROGRAMMES, "a path that ends in .toml"]

@@ -45,7 +45,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         check_name("detector", name, detector_names())
     for name in controllers or ():
         check_name("controller", name, controller_names())
-    suites, programme = load_suites(arguments.suite), PROGRAMMES.get(arguments.suite)
+    only = None if arguments.suites is None else tuple(arguments.suites.split(","))
+    suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
     if programme is None:
         cells = every_cell(detectors or (DETECTOR,), controllers or (CONTROLLER,))
     else:
