@@ -217,7 +217,8 @@ def _study(command: Sequence[str]) -> None:
         for r in runs
         for point in r["curve"]
     ]
-    results = {"runs": [{k: v for k, v in r.items() if k not in METRICS} for r in runs], "mcnemar": pairs}
+    results = {"runs": [{k: v for k, v in r.items() if k not in METRICS} for r in runs]}
+    results["mcnemar"] = study.corrected(pairs)
     about = study.about(
         "ablation",
         command,
@@ -232,7 +233,7 @@ def _study(command: Sequence[str]) -> None:
 
 def main(command: Sequence[str] | None = None) -> int:
     """Run the command line (`sys.argv` if not given) and return the exit code; 2 for unusable input."""
-    return study.run_command("ablation", _study, command)
+    return study.run_command(_study, command)
 
 
 if __name__ == "__main__":

@@ -202,7 +202,7 @@ def compare(lines: Sequence[Line]) -> list[dict[str, Any]]:
             views = [line for line in lines if line["graspable"] and belongs(line)]
             answers = {name: [v[metric] for v in own] for name, own in by_detector(views).items()}
             rows += [{"metric": metric, "group": group, **row} for row in study.paired(answers)]
-    return rows
+    return study.corrected(rows)
 
 
 def draw(results: Mapping[str, Any]) -> Figure:
@@ -299,7 +299,7 @@ def _study(command: Sequence[str]) -> None:
 
 def main(command: Sequence[str] | None = None) -> int:
     """Run the command line (`sys.argv` if not given) and return the exit code; 2 for unusable input."""
-    return study.run_command("held_out", _study, command)
+    return study.run_command(_study, command)
 
 
 if __name__ == "__main__":

@@ -180,7 +180,7 @@ def _study(command: Sequence[str]) -> None:
 
 def main(command: Sequence[str] | None = None) -> int:
     """Run the command line (`sys.argv` if not given) and return the exit code; 2 for unusable input."""
-    return study.run_command("run_time", _study, command)
+    return study.run_command(_study, command)
 
 
 if __name__ == "__main__":

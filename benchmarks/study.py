@@ -13,17 +13,20 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from mpgrasp import command_line
 from mpgrasp.bench.plugins import load_detector
 from mpgrasp.bench.provenance import provenance, sha256
-from mpgrasp.bench.statistics import wilson_interval
+from mpgrasp.bench.statistics import holm, mcnemar, wilson_interval
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
+from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.paths import WEIGHTS
 from mpgrasp.plain import plain
+from mpgrasp.replace_file import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,27 +39,19 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
-class Parser(argparse.ArgumentParser):
-    """Command line of a study; unusable arguments raise ConfigError."""
-
-    def __init__(self, *, description: str | None) -> None:
-        super().__init__(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(message, allowed=f"see {self.prog} --help")
+Parser = partial(command_line.Parser, formatter_class=argparse.RawDescriptionHelpFormatter)
+"""Command line of a study; unusable arguments raise ConfigError."""
 
 
-def run_command(name: str, study: Callable[[Sequence[str]], None], command: Sequence[str] | None) -> int:
+def run_command(study: Callable[[Sequence[str]], None], command: Sequence[str] | None) -> int:
     """Run a study's command line (`sys.argv` if None) and return the exit code; 2 for unusable input."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is loaded, as in the benchmark
-    try:
+
+    def run() -> int:
         study(sys.argv[1:] if command is None else command)
-    except MpgraspError as error:
-        print(f"{name}: error:", " ".join(str(error).splitlines()), file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    return 0
+        return 0
+
+    return command_line.run_command(run)
 
 
 def positive(name: str, *values: float) -> None:
@@ -150,19 +145,20 @@ def percent(found: Mapping[str, float]) -> str:
 def paired(right: Mapping[str, Sequence[bool]]) -> list[dict[str, Any]]:
     """Exact McNemar test of every pair: names and answers (n,) to the same n questions.
 
-    Where a and b differ, heads and tails would be equally likely if neither were better; p is two-sided
-    and not corrected for the number of pairs.
+    p is two-sided and not yet corrected for the number of tests; see `corrected`.
     """
-    from scipy.stats import binomtest
-
     rows = []
     for a, b in combinations(right, 2):
         only_a = sum(x and not y for x, y in zip(right[a], right[b], strict=True))
         only_b = sum(y and not x for x, y in zip(right[a], right[b], strict=True))
-        differ = only_a + only_b
-        p = float(binomtest(only_a, differ).pvalue) if differ else 1.0
-        rows.append({"a": a, "b": b, "n": len(right[a]), "only_a": only_a, "only_b": only_b, "p": p})
+        counts = {"n": len(right[a]), "only_a": only_a, "only_b": only_b}
+        rows.append({"a": a, "b": b, **counts, "p": mcnemar(only_a, only_b)})
     return rows
+
+
+def corrected(tests: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """All tests of a study, each with `p_holm`: its `p` corrected after Holm over all of them."""
+    return [{**test, "p_holm": p} for test, p in zip(tests, holm([test["p"] for test in tests]), strict=True)]
 
 
 def figure(panels: int = 1, *, width: float = 6.0, height: float = 4.6) -> tuple[Figure, list[Axes]]:
@@ -247,9 +243,7 @@ def _flat(row: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def _write(path: Path, text: str) -> None:
-    partial = path.with_name(path.name + ".part")
     try:
-        partial.write_text(text, "utf-8")
-        partial.replace(path)
+        replace_file(path, text)
     except OSError as error:
         raise OutputError(f"results cannot be written: {error}", got=str(path)) from error

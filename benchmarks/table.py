@@ -9,6 +9,8 @@ import argparse
 import json
 from pathlib import Path
 
+from mpgrasp.exceptions import ConfigError
+
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 BEGIN, END = "<!-- results: python benchmarks/table.py --write -->", "<!-- end of results -->"
@@ -20,12 +22,26 @@ NOT_PLAYED = ""
 
 
 def cells() -> list[dict]:
-    """All published cells, as in the summaries."""
+    """All published cells, as in the summaries.
+
+    Raises:
+        ConfigError: two runs have played the same cell.
+    """
     found: list[dict] = []
+    source: dict[tuple[str, str, str], Path] = {}
     for path in sorted(RESULTS.glob("*/summary.json")):
         summary = json.loads(path.read_text(encoding="utf-8"))
         assert summary["complete"], f"{path} is the summary of an unfinished run"
-        found += summary["cells"]
+        for cell in summary["cells"]:
+            key = cell["suite"], cell["detector"], cell["controller"]
+            if key in source:
+                raise ConfigError(
+                    f"two runs have played {'/'.join(key)}",
+                    got=[file.parent.name for file in (source[key], path)],
+                    allowed="each cell in one published run",
+                )
+            source[key] = path
+            found.append(cell)
     return found
 
 

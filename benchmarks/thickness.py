@@ -211,7 +211,7 @@ def _study(command: Sequence[str]) -> None:
 
 def main(command: Sequence[str] | None = None) -> int:
     """Run the command line (`sys.argv` if not given) and return the exit code; 2 for unusable input."""
-    return run_command("thickness", _study, command)
+    return run_command(_study, command)
 
 
 if __name__ == "__main__":

@@ -161,15 +161,18 @@ def _resize_by_area(depth: NDArray[np.float32], size: int) -> NDArray[np.float32
     index, weight, centre = _footprint(depth.shape[0], size)
     reference = depth[np.ix_(centre, centre)]
     total, mass = np.zeros_like(reference), np.zeros_like(reference)
-    for k in range(len(index)):
-        rows = depth[index[k]]
-        for m in range(len(index)):
-            offset = rows[:, index[m]] - reference
-            w = np.outer(weight[k], weight[m])
-            w *= np.abs(offset) < EDGE_GAP  # False where either is NaN
-            np.copyto(offset, 0, where=w == 0)
-            total += w * offset
+    w = np.empty_like(reference)
+    columns = [depth.take(col, axis=1) for col in index]  # each (old, new)
+    for row, row_weight in zip(index, weight, strict=True):
+        for column, col_weight in zip(columns, weight, strict=True):
+            offset = column.take(row, axis=0)
+            offset -= reference
+            near = np.abs(offset) < EDGE_GAP  # False where either is NaN
+            np.outer(row_weight, col_weight, out=w)
+            w *= near
             mass += w
+            w *= np.where(near, offset, np.float32(0))
+            total += w
     return reference + total / np.where(mass > 0, mass, 1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -152,10 +153,11 @@ class ClearingResult:
     def as_record(self) -> dict[str, Any]:
         """A JSON-ready dict with the keys of a single grasp's, and those of a clearing.
 
-        How the arm moved (`REACH`) are medians over the attempts; `reflex` is the first stop.
+        How the arm moved (`REACH`) are medians over the attempts in which it was measured; `reflex` is the
+        first stop.
         """
         reaches = {
-            key: [value for pick in self.picks if (value := getattr(pick.result, key)) is not None]
+            key: [value for pick in self.picks if _is_measured(value := getattr(pick.result, key))]
             for key in REACH
         }
         names = ("sim_time_s", "time_limit_s", "ticks", "min_singular_value", "near_singularity_s",
@@ -174,3 +176,8 @@ class ClearingResult:
                 "picks": [pick.as_record() for pick in self.picks],
             }
         )
+
+
+def _is_measured(value: float | None) -> bool:
+    """Neither None nor NaN, which no median can be taken of."""
+    return value is not None and math.isfinite(value)

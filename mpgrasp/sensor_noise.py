@@ -88,8 +88,7 @@ def apply(
     scale = intrinsics.fx / noise.focal_px
     fb = np.float32(noise.focal_px * noise.baseline)
     disparity = fb / depth
-    error = _correlated_noise(depth.shape, noise.correlation_px * scale, rng)
-    error *= np.float32(noise.subpixel)
+    error = _correlated_noise(depth.shape, noise.correlation_px * scale, rng) * np.float32(noise.subpixel)
     error += disparity
     if noise.disparity_step > 0:
         error *= np.float32(1 / noise.disparity_step)
@@ -121,9 +120,9 @@ def _correlated_noise(
     # white noise through a separable filter has the product of both kernels' squared norms for its variance
     kernel = np.asarray(kernel / np.linalg.norm(kernel), np.float32)
     # wrapping round keeps the variance even at the border, where reflecting would double it
-    padded = np.pad(white, radius, mode="wrap")
-    blurred = cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel)
-    return np.ascontiguousarray(blurred[radius:-radius, radius:-radius])
+    padded = cv2.copyMakeBorder(white, radius, radius, radius, radius, cv2.BORDER_WRAP)
+    blurred = np.asarray(cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel), np.float32)
+    return blurred[radius:-radius, radius:-radius]
 
 
 def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -136,10 +135,13 @@ def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
     column = np.arange(disparity.shape[1], dtype=np.float32)
     right = column - disparity
     right[np.isnan(right)] = np.inf
-    nearest = np.minimum.accumulate(right[:, ::-1], axis=1)[:, ::-1]
-    hidden = np.zeros(disparity.shape, bool)
     # neighbours on one flat surface are a whole pixel apart: half of that rounds the band's width
-    np.less(nearest[:, 1:], right[:, :-1] + np.float32(0.5), out=hidden[:, :-1])
+    bound = right[:, :-1] + np.float32(0.5)
+    hidden = np.zeros(disparity.shape, bool)
+    # a row in which every pixel falls beyond the one before it hides none
+    rows = np.flatnonzero((right[:, 1:] < bound).any(axis=1))
+    nearest = np.minimum.accumulate(right[rows, ::-1], axis=1)[:, ::-1]
+    hidden[rows, :-1] = nearest[:, 1:] < bound[rows]
     hidden[np.isinf(right)] = False
     return hidden
 
@@ -153,11 +155,18 @@ def _grazing(
     """
     bound = np.float32(np.tan(max_incidence))
     grazing = np.zeros(depth.shape, bool)
-    for step, middle, target, focal in (
-        (np.diff(depth, axis=1), depth[:, 1:-1], grazing[:, 1:-1], intrinsics.fx),
-        (np.diff(depth, axis=0).T, depth[1:-1].T, grazing[1:-1].T, intrinsics.fy),
-    ):
-        before, after = step[..., :-1], step[..., 1:]
-        steepest = np.maximum(np.minimum(before, after), -np.maximum(before, after))
-        target[...] |= steepest > middle * np.float32(bound / focal)
+    step = np.diff(depth, axis=1)
+    grazing[:, 1:-1] = _steep(step[:, :-1], step[:, 1:], depth[:, 1:-1] * np.float32(bound / intrinsics.fx))
+    step = np.diff(depth, axis=0)
+    grazing[1:-1] |= _steep(step[:-1], step[1:], depth[1:-1] * np.float32(bound / intrinsics.fy))
     return grazing
+
+
+def _steep(
+    before: NDArray[np.float32], after: NDArray[np.float32], bound: NDArray[np.float32]
+) -> NDArray[np.bool_]:
+    """Where both steps, before and after a pixel, go up by more than the bound or both go down by more."""
+    steepest = np.minimum(before, after)
+    fall = np.maximum(before, after)
+    np.maximum(steepest, np.negative(fall, out=fall), out=steepest)
+    return steepest > bound

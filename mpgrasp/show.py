@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
+from mpgrasp.command_line import run_command
+from mpgrasp.exceptions import ConfigError, OutputError
 
 if TYPE_CHECKING:
     from mpgrasp.depth import DepthFrame
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mpgrasp.grasp import GraspMap
     from mpgrasp.height_map import HeightMap
 
-EXIT_DISAGREEMENT, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_DISAGREEMENT = 1
 
 _REPEATS = 5  # predictions that are timed once a detector is warm
 _MAX_HEIGHT = 1.0  # [m]
@@ -252,17 +252,14 @@ def main(parser: argparse.ArgumentParser, command: Sequence[str] | None = None) 
     """Run the command line (`sys.argv` if not given), as `parser` reads it, and return the exit code."""
     # before torch is loaded: times are those of one thread, as in the benchmark, unless asked otherwise
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    try:
-        options = parser.parse_args(command)
-        if options.command == "check":
-            return _run_check(options)
-        if options.command == "show":
-            _run_show(options)
-        else:
-            _print_card(card(options.detector, options.weights))
-    except MpgraspError as error:
-        print("mpgrasp: error:", " ".join(str(error).splitlines()), file=sys.stderr)
-        return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+    return run_command(lambda: _run(parser.parse_args(command)))
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.command == "check":
+        return _run_check(options)
+    if options.command == "show":
+        _run_show(options)
+    else:
+        _print_card(card(options.detector, options.weights))
     return 0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import signal
 import time
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +115,15 @@ def hangs(scene_config: Any, seed: int, **_: Any) -> FakeResult:
     """Never comes back from episode 1."""
     if seed == _seed(1):
         time.sleep(3600)
+    return FakeResult(seed, scene_config)
+
+
+def lets_go(scene_config: Any, seed: int, **_: Any) -> FakeResult:
+    """Closes its end of the pipe in episode 1 and goes on, out of reach."""
+    if seed == _seed(1):
+        for connection in [item for item in gc.get_objects() if isinstance(item, Connection)]:
+            connection.close()
+        time.sleep(20)
     return FakeResult(seed, scene_config)
 
 

@@ -10,6 +10,7 @@ import pytest
 from test_bench_cli import PLUG_INS, fake_world, records
 
 from mpgrasp.bench.__main__ import main
+from mpgrasp.bench.compare import compare_times
 from mpgrasp.bench.pairing import pair
 from mpgrasp.exceptions import ConfigError
 
@@ -20,7 +21,9 @@ def line(episode: int, success: bool, **other: Any) -> dict[str, Any]:
     common = {"suite": "s", "seed": 0, "scene_seed": episode, "detector": "d", "controller": "c"}
     how = {
         "outcome": "success" if success else "missed",
+        "object": "o",
         "sim_time_s": 5.0,
+        "reflex": None,
         "state_hash": f"{episode}{success}",
     }
     return {**common, **how, "episode": episode, "success": success, **other}
@@ -31,7 +34,7 @@ def lines(pattern: str, **other: Any) -> list[dict[str, Any]]:
     found = []
     for episode, letter in enumerate(pattern):
         if letter == "x":
-            found.append(line(episode, False, outcome="error", **other))
+            found.append(line(episode, False, outcome="error", error="a bug", **other))
         elif letter != " ":
             found.append(line(episode, letter == "1", **other))
     return found
@@ -67,6 +70,11 @@ def test_times_are_compared_where_both_succeeded() -> None:
     assert found.time_low <= 2.0 <= found.time_high
 
 
+def test_worlds_that_a_played_and_b_has_only_an_error_row_of_are_lost() -> None:
+    found = pair(lines("101x 1xx"), lines("xx1xx0 1") + lines("1"))
+    assert (found.n, found.errors_a, found.errors_b, found.lost) == (3, 3, 4, 1)
+
+
 def test_another_scene_and_a_double_episode_are_refused() -> None:
     with pytest.raises(ConfigError, match="had another scene"):
         pair(lines("11"), lines("11", scene_seed=7))
@@ -96,13 +104,110 @@ def test_several_cells_are_matched_by_name_and_corrected_together(
 ) -> None:
     a, b = (run_with(tmp_path / name, "1" * 30) for name in "ab")
     for folder, pattern in ((a, "1" * 30), (b, "0" * 6 + "1" * 24)):
-        with (folder / "episodes.jsonl").open("a") as file:
-            file.writelines(json.dumps(item) + "\n" for item in lines(pattern, detector="other"))
+        add(folder, lines(pattern, detector="other"))
     # alone p = 0.031 is significant, as one of two tests 0.062 is not
     assert main(["compare", f"{a}/other/c", f"{b}/other/c"]) == 1
     assert main(["compare", str(a), str(b)]) == 0
     assert main(["compare", f"{a}/d/c", f"{b}/other/c"]) == 1
     assert "d/c" in capsys.readouterr().out
+
+
+def printed_by(capsys: pytest.CaptureFixture[str], a: Path, b: Path, *, code: int) -> str:
+    assert main(["compare", str(a), str(b)]) == code
+    return capsys.readouterr().out
+
+
+def test_who_crashes_in_episodes_that_the_other_played_is_worse(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole, torn = run_with(tmp_path / "whole", "1" * 100), run_with(tmp_path / "torn", "1" * 40 + "x" * 60)
+    dead = run_with(tmp_path / "dead", "x" * 100)
+    text = printed_by(capsys, whole, torn, code=1)
+    assert "B is worse: episodes that A played are errors in B: 60 of 100 of s/d/c" in text
+    assert "0, 60" in text
+    assert "no significant difference" not in text
+    assert "100 of 100 of s/d/c" in printed_by(capsys, whole, dead, code=1)
+    for b in (whole, torn):  # that A crashed is said, and no reproach to B
+        text = printed_by(capsys, torn, b, code=0)
+        assert "60, " in text
+        assert "no significant difference" in text
+    assert main(["compare", str(dead), str(whole)]) == 2
+
+
+def add(folder: Path, episodes: list[dict[str, Any]]) -> Path:
+    with (folder / "episodes.jsonl").open("a") as file:
+        file.writelines(json.dumps(item) + "\n" for item in episodes)
+    return folder
+
+
+def test_cells_that_only_one_side_has_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    a, b = (run_with(tmp_path / name, "1" * 9) for name in "ab")
+    add(a, lines("0" * 9, detector="old"))
+    add(add(b, lines("1" * 9, detector="new")), lines("1" * 9, detector="newer"))
+    text = printed_by(capsys, a, b, code=0)
+    assert "In A alone, so not compared: s/old/c\n" in text
+    assert "In B alone, so not compared: s/new/c, s/newer/c\n" in text
+    assert "alone, so" not in printed_by(capsys, a, a, code=0)
+
+
+def clearings(*seconds: float | None, limit: float = 900.0) -> list[dict[str, Any]]:
+    """Lines of tables that were cleared in so many seconds, or given up after one (None)."""
+    of_clearing: dict[str, Any] = {
+        "picks": [],
+        "failures": {},
+        "in_basket": [],
+        "knocked_off": [],
+        "left": [],
+    }
+    return [
+        line(k, time is not None, sim_time_s=time or 1.0, time_limit_s=limit, **of_clearing)
+        for k, time in enumerate(seconds)
+    ]
+
+
+TIMES = [200.0 + 10 * k for k in range(8)]
+
+
+@pytest.mark.parametrize(
+    ("b", "code", "verdict"),
+    [
+        (clearings(*(time + k + 1 for k, time in enumerate(TIMES))), 1, "B is slower"),
+        (clearings(*(time - k - 1 for k, time in enumerate(TIMES))), 0, "B is faster"),
+        (clearings(*(time + (-1) ** k for k, time in enumerate(TIMES))), 0, "no significant difference"),
+        (clearings(None, None, *(time + 1 for time in TIMES[2:])), 1, "B is slower"),  # and n. s. in success
+    ],
+)
+def test_who_clears_tables_significantly_more_slowly_is_worse(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], b: list[dict[str, Any]], code: int, verdict: str
+) -> None:
+    folders = [add(run_with(tmp_path / name, ""), own) for name, own in (("a", clearings(*TIMES)), ("b", b))]
+    text = printed_by(capsys, *folders, code=code)
+    assert verdict in text
+    assert "235.0" in text  # A's mean
+
+
+def test_the_time_to_clear_is_cut_off_at_the_limit_of_both_and_p_is_the_signed_rank_tests() -> None:
+    found = compare_times(clearings(*TIMES, limit=250.0), clearings(*(time + 90 for time in TIMES)))
+    assert found is not None
+    assert found.mean_a == pytest.approx(sum(min(time, 250) for time in TIMES) / 8)
+    assert found.mean_b == pytest.approx(250.0)
+    # the last three are ties, and the other five all have one sign
+    assert found.p == pytest.approx(2 / 2**5)
+    assert found.slower
+    assert compare_times(lines("11"), lines("11")) is None
+
+
+def test_tests_of_success_and_of_times_are_corrected_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slower = clearings(*(time + k + 1 for k, time in enumerate(TIMES)))
+    cells = {"a": clearings(*TIMES), "b": slower}
+    folders = [add(run_with(tmp_path / name, ""), own) for name, own in cells.items()]
+    assert f"{2 * 2 / 2**8:.3g}" in printed_by(capsys, *folders, code=1)  # times and success: two tests
+    for folder in folders:
+        for k in range(5):
+            add(folder, lines("1" * 9, detector=f"other{k}"))
+    assert f"{7 * 2 / 2**8:.3g}" in printed_by(capsys, *folders, code=0)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import html
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,13 +14,25 @@ import numpy as np
 import pytest
 from test_bench_cli import PLUG_INS, fake_world
 
+from mpgrasp.bench import report_tables
 from mpgrasp.bench.__main__ import main
-from mpgrasp.bench.document import Folded, Listing, Paragraph, Section, Table, to_html, to_markdown
+from mpgrasp.bench.document import (
+    Folded,
+    Listing,
+    Paragraph,
+    Section,
+    Table,
+    to_html,
+    to_markdown,
+)
 from mpgrasp.bench.html_report import write_report
 from mpgrasp.bench.hypotheses import Verdict, evaluate
 from mpgrasp.bench.paper_results import CELLS, CLAIMS, STACKED, Claim, Measure, reported
+from mpgrasp.bench.paper_tables import hypothesis_blocks
 from mpgrasp.bench.summary import by_cell
-from mpgrasp.bench.trace import KEPT, TraceRecorder, prune_traces, read_trace
+from mpgrasp.bench.trace import KEPT, prune_traces, read_trace
+from mpgrasp.bench.trace_recorder import TraceRecorder
+from mpgrasp.episode import STAGES
 from mpgrasp.exceptions import OutputError
 
 __all__ = ["fake_world"]
@@ -40,6 +54,7 @@ def lines(pattern: str, detector: str = "dhrnet", controller: str = "mppc", **ot
             "state_hash": f"{detector}{controller}{episode}",
             "min_singular_value": 0.1,
             "blind_drift_m": 0.01,
+            "timing": {"render": 4.0, "detect": 2.0, "control": 1.0, "ik": 2.0, "physics": 1.0},
         }
         if letter == "x":
             how = {
@@ -59,6 +74,7 @@ def make_run(folder: Path, episodes: list[Line], **about: Any) -> Path:
         "suite": {"name": "thin"}, "suites": [{"name": "thin"}], "seed": 0, "detectors": [],
         "controllers": [{"name": "mppc", "config": {"grid": grid}}],
     }  # fmt: skip
+    configuration |= {key: about.pop(key) for key in ("suite", "detectors", "camera") if key in about}
     run = {"configuration": configuration, "command": "python -m mpgrasp.bench thin", **about}
     (folder / "run.json").write_text(json.dumps(run))
     (folder / "episodes.jsonl").write_text("".join(json.dumps(line) + "\n" for line in episodes))
@@ -120,7 +136,7 @@ def markdown_tables(text: str) -> list[list[list[str]]]:
     before = False
     for row in text.splitlines():
         if row.startswith("| "):
-            cells = [c.strip().replace("\\|", "|") for c in re.split(r"(?<!\\)\|", row)[1:-1]]
+            cells = [html.unescape(c.strip().replace("\\|", "|")) for c in re.split(r"(?<!\\)\|", row)[1:-1]]
             if not before:
                 tables.append([])
             if set(cells) != {"---"}:
@@ -269,7 +285,7 @@ def test_without_traces_and_card_the_report_says_so(tmp_path: Path) -> None:
     write_report([run], run)
     text = (run / "report.md").read_text()
     assert "Not kept: singular values and ways of suite thin" in text
-    assert "Not kept: thin: DHRNet + MP-PC: stills of a success" in text
+    assert "Not kept: stills of thin: DHRNet + MP-PC, success; thin: DHRNet + MP-PC, failure." in text
     assert "has no physics card" in text
     assert "No two cells of one suite" in text
 
@@ -290,6 +306,49 @@ def test_a_broken_trace_is_said_and_one_of_another_run_is_not_shown(tmp_path: Pa
     text = (run / "report.md").read_text()
     assert "A trace cannot be read: not a trace" in text
     assert "Not kept: singular values" in text
+
+
+def test_differences_between_runs_are_told_with_their_folders(tmp_path: Path) -> None:
+    folders = [
+        make_run(tmp_path / "a", lines("1"), camera={"name": "it is there and here"}),
+        make_run(tmp_path / "b", lines("1", controller="mvp"), camera={"name": "gone"}),
+    ]
+    write_report(folders, tmp_path)
+    told = f'name: "it is there and here" in `{folders[0]}`, "gone" in `{folders[1]}`'
+    assert f"Not the same in all runs: camera.{told}" in (tmp_path / "report.md").read_text()
+
+
+def test_a_ticks_time_is_split_between_the_network_and_all_else(tmp_path: Path) -> None:
+    slow = {"render": 1.0, "detect": 6.0, "control": 1.0, "ik": 1.0, "physics": 1.0}
+    run = make_run(
+        tmp_path / "run",
+        # an error row and the line of an older version have no times
+        [
+            *lines("11x0"),
+            *lines("1", controller="mvp", timing=slow),
+            *lines("0", detector="oracle", timing=slow),
+            {**lines("11")[1], "controller": "mvp", "timing": {"detect": 9e9}},
+        ],
+        detectors=[{"name": "oracle", "reads_truth": True}, {"name": "dhrnet", "reads_truth": False}],
+    )
+    write_report([run], run)
+    text = (run / "report.md").read_text()
+    (table,) = [t for t in markdown_tables(text) if "network inference" in t[0]]
+    assert [row[1:4] + row[-1:] for row in table[1:]] == [
+        ["DHRNet + MP-PC", "3", "10.0", "20.0 %"],
+        ["DHRNet + MVP", "1", "10.0", "60.0 %"],
+        ["oracle + MP-PC", "1", "10.0", "no network"],
+    ]
+    # three ticks with 8 ms and one with 4 ms of all else, of 40 ms
+    assert "everything apart from network inference: 70.0 %" in text
+
+
+def test_the_stages_of_a_tick_are_those_of_an_episode() -> None:
+    assert report_tables.STAGES == STAGES
+
+
+def test_a_report_of_others_has_no_section_on_thickness(folder: Path) -> None:
+    assert "Thin objects" not in (folder / "report.md").read_text()
 
 
 def test_folders_of_runs_are_put_into_one_report(tmp_path: Path) -> None:
@@ -329,13 +388,43 @@ def test_text_is_escaped_and_code_is_marked() -> None:
         Listing(lines=["x > y"]),
         Folded(summary="more", blocks=(Table(caption="t", headings=("h",), rows=[("p|q `r",)]),)),
     )
-    html = to_html("<T>", [Section(title="S & S", blocks=blocks)])
-    assert "<p>a &lt; b &amp; <code>c&lt;d&gt;</code></p>" in html
-    assert "<h1>&lt;T&gt;</h1>" in html
-    assert "<td>p|q `r</td>" in html
+    page = to_html("<T>", [Section(title="S & S", blocks=blocks)])
+    assert "<p>a &lt; b &amp; <code>c&lt;d&gt;</code></p>" in page
+    assert "<h1>&lt;T&gt;</h1>" in page
+    assert "<td>p|q `r</td>" in page
     markdown = to_markdown("<T>", [Section(title="S & S", blocks=blocks)])
     assert "| p\\|q `r |" in markdown
     assert "```sh\nx > y\n```" in markdown
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "two\nlines",
+        "two\r\nlines",
+        "<script>alert(1)</script>",
+        "a | b",
+        "a \\| b",
+        "``` <script> `",
+        "` <b>",
+    ],
+)
+def test_no_cell_of_markdown_tears_its_table_or_brings_html(cell: str) -> None:
+    table = Table(caption=cell, headings=("a", cell), rows=[(cell, "last")], note=cell)
+    blocks = (table, Paragraph(text=cell))
+    markdown = to_markdown("T", [Section(title="S", blocks=blocks)])
+    assert "<" not in markdown
+    rows = [line for line in markdown.split("\n") if line.startswith("| ")]
+    assert len(rows) == 3
+    for row in rows:
+        # a bar is the table's unless it is behind a backslash that is not itself behind one
+        assert len(re.findall(r"(?<!\\)(?:\\\\)*\|", row)) == 3
+    assert rows[2].endswith(" | last |")
+
+
+def test_code_in_markdown_keeps_its_angle_brackets() -> None:
+    markdown = to_markdown("T", [Section(title="S", blocks=(Paragraph(text="a < b, `c < d`"),))])
+    assert "a &lt; b, `c < d`" in markdown
 
 
 def claim(measure: Measure = Measure.SUCCESS) -> Claim:
@@ -375,6 +464,38 @@ def test_p_is_corrected_over_the_claims_that_could_be_tested() -> None:
     both = evaluate(cells, [claim(), absent, claim(Measure.REFLEX)])
     assert both[0].p_holm == pytest.approx(4 / 2**8)
     assert both[1].absent == "suite single absent"
+
+
+@pytest.mark.parametrize("measure", [Measure.SUCCESS, Measure.TIME])
+@pytest.mark.parametrize(
+    ("n", "verdict"), [(3, Verdict.UNDECIDABLE), (5, Verdict.UNDECIDABLE), (6, Verdict.CONFIRMED)]
+)
+def test_a_claim_cannot_be_decided_where_no_outcome_would_be_significant(
+    measure: Measure, n: int, verdict: Verdict
+) -> None:
+    # better in every world: the smallest p there is, 2 / 2^n
+    best = [*lines("1" * n, time_limit_s=100.0), *lines("0" * n, controller="mvp", time_limit_s=100.0)]
+    (found,) = evaluate(by_cell(best), [claim(measure)])
+    assert (found.verdict, found.agrees) == (verdict, True)
+    assert found.p == pytest.approx(2 / 2**n)
+
+
+def test_what_cannot_be_decided_is_counted_apart_and_no_part_of_the_correction() -> None:
+    few = [*lines("111", suite="stacked"), *lines("000", suite="stacked", controller="mvp")]
+    cells = by_cell([*lines("1" * 6), *lines("0" * 6, controller="mvp"), *few])
+    stacked = replace(claim(), suite="stacked")
+    decided, open_one = evaluate(cells, [claim(), stacked])
+    assert decided.p_holm == decided.p
+    assert decided.verdict is Verdict.CONFIRMED
+    assert np.isnan(open_one.p_holm)
+    text, table = hypothesis_blocks([decided, open_one])
+    assert isinstance(text, Paragraph)
+    assert isinstance(table, Table)
+    assert "1 confirmed, 1 cannot be decided" in text.text
+    assert "from 6 worlds on" in text.text
+    assert [row[-2:] for row in table.rows] == [("0.0312", "confirmed"), ("-", "cannot be decided")]
+    (alone,) = (block for block in hypothesis_blocks([decided]) if isinstance(block, Paragraph))
+    assert "worlds" not in alone.text
 
 
 def test_times_are_compared_in_pairs_and_whoever_failed_took_the_limit() -> None:

@@ -62,8 +62,37 @@ def test_a_resumed_run_ends_as_an_undisturbed_one(
     assert main(["--resume", str(part)]) == 0
     assert same(part, whole)
     assert all(line in records(part) for line in kept)  # timing included: they were not played again
-    assert "5 episodes are there already" not in capsys.readouterr().out
+    assert "are there already" not in capsys.readouterr().err  # the run was begun with --quiet
     assert len(json.loads((part / "run.json").read_text())["resumed"]) == 1
+
+
+def test_a_resumed_run_says_how_much_is_there_unless_it_is_quiet(
+    part: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    loud = [word for word in command(part) if word not in ("--quiet", "--out", str(part))]
+    capsys.readouterr()
+    assert main([*loud, "--resume", str(part)]) == 0
+    printed = capsys.readouterr()
+    assert printed.err.startswith("mpgrasp: 5 episodes are there already\n[6/12, ")
+    assert "already" not in printed.out
+
+
+def test_an_unfinished_run_is_resumed_or_refused_but_never_begun_anew(
+    part: Path, whole: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (part / "episodes.jsonl").read_bytes()
+    capsys.readouterr()
+    assert main(command(part)) == 2
+    printed = capsys.readouterr()
+    assert f"unfinished (5 of 12 episodes are there); got '{part}'; allowed: --resume {part}" in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+    assert (part / "episodes.jsonl").read_bytes() == before
+    assert main(["--resume", str(part)]) == 0
+    assert same(part, whole)
+    assert main(command(part)) == 0  # it is complete now
+    assert same(part, whole)
+    assert len((part / "episodes.previous.jsonl").read_bytes().splitlines()) == 12
 
 
 def test_resuming_takes_the_whole_command_too_and_a_finished_run_is_left_as_it_is(
@@ -107,7 +136,7 @@ def test_another_version_is_noted_and_written_down(
     assert list(entry["made_with"]["packages"]) == ["numpy"]
 
 
-@pytest.mark.parametrize("rest", ['{"episode": 2, "suite": "th', "\x00\x00\x00\x00", '{"half": 1}\n', "{"])
+@pytest.mark.parametrize("rest", ['{"episode": 2, "suite": "th', "\x00\x00\x00\x00", '{"half": 1}', "{"])
 def test_a_torn_last_line_is_cut_off_with_a_note_and_nothing_is_lost(
     part: Path, whole: Path, capsys: pytest.CaptureFixture[str], rest: str
 ) -> None:
@@ -188,14 +217,14 @@ def test_a_disk_that_fills_up_keeps_the_finished_episodes_and_can_be_resumed(
 def test_a_summary_that_finds_no_room_is_an_error_and_the_lines_stay(
     fake_world: pytest.MonkeyPatch, whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def no_room(self: RunDirectory, name: str, text: str) -> None:
-        if name != "run.json":
+    def no_room(file: Path, text: str) -> None:
+        if file.name != "run.json":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        (self.path / name).write_text(text)
+        file.write_text(text)
 
     out = tmp_path / "full"
     with pytest.MonkeyPatch.context() as disk:
-        disk.setattr(RunDirectory, "_replace", no_room)
+        disk.setattr("mpgrasp.bench.run_directory.replace_file", no_room)
         assert main(command(out)) == 2
     printed = capsys.readouterr()
     assert "No space left" in printed.err

@@ -16,15 +16,12 @@ import pytest
 from mpgrasp.bench.plan import Plan, every_cell
 from mpgrasp.bench.player import Player
 from mpgrasp.bench.plugins import load_controller, load_detector
-from mpgrasp.bench.run_directory import RunDirectory
 from mpgrasp.bench.runner import play_all
 from mpgrasp.bench.suite import episode_seed, load_suite
-from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
+from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.plain import difference, one_line, plain
 
 DETECTOR, CONTROLLER = "fakes:FakeDetector", "fakes:FakeController"
-RUN = {"configuration": {"suite": {}, "seed": 0}}
-WHICH = {"suite": "thin", "episode": 0, "detector": DETECTOR, "controller": CONTROLLER}
 
 
 def make_plan(**settings: Any) -> Plan:
@@ -165,59 +162,13 @@ def test_plug_ins_get_their_weights(tmp_path: Path) -> None:
         load_detector(DETECTOR, tmp_path / "absent.pt")
 
 
-def test_a_run_directory_holds_every_line_at_once(tmp_path: Path) -> None:
-    directory = RunDirectory.create(tmp_path / "a" / "b", RUN)
-    for k in range(3):
-        directory.append({**WHICH, "episode": k, "x": np.float64(1 / 3), "nan": float("nan")})
-        assert len(directory.episodes_file.read_bytes().splitlines()) == k + 1
-    assert directory.episodes()[0] == {**WHICH, "episode": 0, "x": 0.333333333, "nan": None}
-    directory.write_summary({"complete": True, "cells": [{"n": 3}]})
-    assert json.loads((directory.path / "summary.json").read_text()) == {
-        "complete": True,
-        "cells": [{"n": 3}],
-    }
-
-
-def test_a_directory_with_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
-    first = RunDirectory.create(tmp_path, RUN)
-    first.append({"episode": 0})
-    first.close()
-    before = {path: path.read_bytes() for path in tmp_path.glob("*.json*")}
-    with pytest.raises(OutputError, match=r"another run \(seed: 0 there, 1 here\)"):
-        RunDirectory.create(tmp_path, {"configuration": {"suite": {}, "seed": 1}})
-    assert {path: path.read_bytes() for path in tmp_path.glob("*.json*")} == before
-
-
-def test_the_same_run_again_starts_afresh_and_keeps_the_old_lines(tmp_path: Path) -> None:
-    first = RunDirectory.create(tmp_path, RUN)
-    first.append({"episode": 0})
-    first.close()
-    again = RunDirectory.create(tmp_path, RUN)
-    assert again.episodes() == []
-    assert (tmp_path / "episodes.previous.jsonl").read_text() == '{"episode": 0}\n'
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{}", "not json"])
-def test_a_directory_with_an_unreadable_run_is_refused(tmp_path: Path, content: str) -> None:
-    (tmp_path / "run.json").write_text(content)
-    with pytest.raises(OutputError, match=r"run\.json cannot be read"):
-        RunDirectory.create(tmp_path, RUN)
-
-
-def test_a_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"):
-        RunDirectory.create(tmp_path / "file", RUN)
-    with pytest.raises(OutputError, match="cannot be written"):
-        RunDirectory.create(tmp_path / "file" / "below", RUN)
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_disk_is_an_output_error(tmp_path: Path) -> None:
-    directory = RunDirectory.create(tmp_path, RUN)
-    directory._episodes = os.open("/dev/full", os.O_WRONLY)
-    with pytest.raises(OutputError, match="No space left"):
-        directory.append({"episode": 0})
+def test_the_order_of_a_plan_is_that_of_its_tasks_whatever_order_they_come_in() -> None:
+    plan = make_plan(controllers=(CONTROLLER, "fakes:OtherController"), episodes=12)
+    tasks = plan.tasks()
+    shuffled = [tasks[k] for k in np.random.default_rng(0).permutation(len(tasks))]
+    assert sorted(shuffled, key=plan.place) == tasks
+    others = [tasks[0]._replace(suite="other"), tasks[0]._replace(detector="other")]
+    assert sorted([*others, tasks[-1]], key=plan.place)[0] == tasks[-1]
 
 
 def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:
@@ -229,8 +180,8 @@ def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:
 def test_the_first_difference_is_named_by_its_path() -> None:
     a = {"x": {"y": [1, 2]}, "z": 1}
     assert difference(a, a) is None
-    assert difference(a, {"x": {"y": [1, 3]}, "z": 1}) == "x.y: [1, 2] there, [1, 3] here"
-    assert difference(a, {"x": {"y": [1, 2]}, "z": 1, "w": 0}) == "w: null there, 0 here"
+    assert difference(a, {"x": {"y": [1, 3]}, "z": 1}) == ("x.y", [1, 2], [1, 3])
+    assert difference(a, {"x": {"y": [1, 2]}, "z": 1, "w": 0}) == ("w", None, 0)
     cells = {"d": [{"n": 1}, {"n": 2}]}
-    assert difference(cells, {"d": [{"n": 1}, {"n": 3}]}) == "d.1.n: 2 there, 3 here"
-    assert difference(cells, {"d": [{"n": 1}]}) == 'd: [{"n": 1}, {"n": 2}] there, [{"n": 1}] here'
+    assert difference(cells, {"d": [{"n": 1}, {"n": 3}]}) == ("d.1.n", 2, 3)
+    assert difference(cells, {"d": [{"n": 1}]}) == ("d", cells["d"], [{"n": 1}])

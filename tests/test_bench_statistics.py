@@ -1,13 +1,22 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mpgrasp.bench.statistics import holm, mcnemar, mean_interval, restricted, wilson_interval
+from mpgrasp.bench.statistics import (
+    FEWEST_PAIRS,
+    holm,
+    mcnemar,
+    mean_interval,
+    restricted,
+    smallest_p,
+    wilcoxon,
+    wilson_interval,
+)
 from mpgrasp.bench.summary import paired_tests, summarise
 from mpgrasp.exceptions import ConfigError
 
@@ -139,13 +148,33 @@ def test_no_tests_no_correction() -> None:
     assert holm([]) == []
 
 
-def test_bootstrap_interval_covers_as_often_as_it_says() -> None:
-    rng = np.random.default_rng(1)
-    trials = [mean_interval(rng.normal(3.0, 2.0, 40)) for _ in range(60)]
-    covered = sum(low <= 3.0 <= high for _, low, high in trials)
-    assert 50 <= covered <= 60
-    widths = [high - low for _, low, high in trials]
-    assert np.mean(widths) == pytest.approx(2 * 1.96 * 2.0 / math.sqrt(40), rel=0.1)
+def test_the_bootstrap_of_as_many_ones_as_zeros_is_binomial() -> None:
+    # symmetric, so that nothing is corrected: the bounds are quantiles of Binomial(16, 1/2) / 16
+    share = [sum(math.comb(16, k) for k in range(up_to + 1)) / 2**16 for up_to in range(17)]
+    low = next(k for k, p in enumerate(share) if p >= 0.025)
+    assert mean_interval([0.0, 1.0] * 8) == (0.5, low / 16, 1 - low / 16)
+
+
+@pytest.mark.parametrize("gain", [[3.0, -1.0, 2.0, 5.0], [1.0, 2.0, 3.0, 4.0, 5.0, -6.0], [-1.0, -2.0]])
+def test_the_signed_rank_test_counts_the_signs_that_are_as_extreme(gain: list[float]) -> None:
+    order = sorted(gain, key=abs)
+    ranks = range(1, len(gain) + 1)
+    middle = sum(ranks) / 2
+    off = sum(r for r, value in zip(ranks, order, strict=True) if value > 0) - middle
+    sums = [
+        sum(r for r, up in zip(ranks, ups, strict=True) if up) for ups in product((0, 1), repeat=len(gain))
+    ]
+    p, positive = wilcoxon(gain)
+    assert p == pytest.approx(sum(abs(total - middle) >= abs(off) for total in sums) / len(sums))
+    assert positive is (off > 0)
+    assert wilcoxon([0.0, 0.0]) == (1.0, False)
+
+
+def test_no_paired_test_is_below_the_smallest_p_and_six_pairs_are_the_fewest() -> None:
+    for n in range(1, 8):
+        assert wilcoxon(np.arange(1.0, n + 1))[0] == pytest.approx(smallest_p(n))
+        assert min(mcnemar(k, m) for k in range(n + 1) for m in range(n + 1 - k)) == smallest_p(n)
+    assert (smallest_p(0), smallest_p(5) > 0.05, smallest_p(6) < 0.05, FEWEST_PAIRS) == (1.0, True, True, 6)
 
 
 def test_a_bootstrap_interval_is_the_same_every_time_and_needs_two_values() -> None:
@@ -172,4 +201,5 @@ def test_every_two_cells_of_a_suite_are_tested_over_common_worlds() -> None:
         (suite, ["d", x], ["d", y]) for suite in ("s", "t") for x, y in ("ab", "ac", "bc")
     ]
     assert [t["p"] for t in tests[:3]] == [pytest.approx(2 / 2**8), 1.0, pytest.approx(2 / 2**8)]
-    assert tests[0]["p_holm"] == pytest.approx(6 * 2 / 2**8)
+    # a family per suite, of three tests, and not one of all six
+    assert [t["p_holm"] for t in tests] == [pytest.approx(min(1.0, 3 * t["p"])) for t in tests]

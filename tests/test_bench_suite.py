@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mpgrasp.bench.suite import Suite, episode_seed, load_suite, parse_suite, suite_names
+from mpgrasp.bench.suite import TRIALS, Suite, episode_seed, load_suite, parse_suite, suite_names
+from mpgrasp.episode_config import ClearingConfig, EpisodeConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.objects import load_object
 
@@ -65,7 +66,13 @@ def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
         (MINIMAL | {"turns": {"objects": ["key"]}}, "not a list of tables"),
         (MINIMAL | {"scene": ["key"]}, "not a table"),
         (MINIMAL | {"scene": {"cloth_unevenness": -1.0}}, "unevenness"),
-        (MINIMAL | {"scene": {"cloth_unevenness": "deep"}}, "suite 's'"),
+        (
+            MINIMAL | {"scene": {"cloth_unevenness": "deep"}},
+            "suite 's', .scene., cloth_unevenness is unusable",
+        ),
+        (MINIMAL | {"scene": {"camouflage": "no"}}, "camouflage is unusable; got 'no'; allowed: .*False"),
+        (MINIMAL | {"trials": True}, "trials out of range; got True"),
+        (MINIMAL | {"trials": 2.5}, "trials out of range; got 2.5"),
     ],
 )
 def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
@@ -73,9 +80,38 @@ def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
         parse_suite("s", declared)
 
 
-def test_unknown_episode_setting_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"unknown key.*'speed'"):
-        parse_suite("s", MINIMAL | {"episode": {"speed": 1}}).episode_config()
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [
+        ({"speed": 1}, r"\[episode\]: unknown key; got 'speed'; allowed: control_dt, "),
+        (
+            {"execution": {"lift_height": 0.1}},
+            r"execution: unknown key; got 'lift_height'.*, overtravel, .*lift,",
+        ),
+        ({"execution": 0.1}, "execution is not a table; got 0.1; allowed: .*overtravel"),
+        ({"execution": {"lift": "high"}}, "execution, lift is unusable; got 'high'"),
+        ({"execution": {"lift": -0.1}}, "execution: lift must be finite and not negative"),
+        ({"start_jitter": {"x": 0.1}}, "start_jitter is a table; got .*; allowed: a value such as 0.05"),
+        ({"start_height": True}, "start_height is unusable; got True"),
+        ({"camera_crop": "all"}, "camera_crop is unusable; got 'all'"),
+    ],
+)
+def test_episode_settings_that_cannot_be_used_are_refused_before_any_episode(
+    declared: dict, message: str
+) -> None:
+    with pytest.raises(ConfigError, match=message) as refused:
+        parse_suite("s", MINIMAL | {"episode": declared}).episode_config()
+    assert str(refused.value).count("suite 's'") == 1
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+def test_a_table_within_the_episode_changes_what_it_names_and_nothing_else(trial: str) -> None:
+    scene = {"objects": ["usb_stick"], "basket": True}
+    declared = {"title": "t", "trial": trial, "scene": scene, "episode": {"execution": {"lift": 0.1}}}
+    kind = ClearingConfig if trial == "clear" else EpisodeConfig
+    expected = dataclasses.replace(kind().execution, lift=0.1)
+    assert parse_suite("s", declared).episode_config().execution == expected
+    assert expected.hold_time == (0.0 if trial == "clear" else 1.0)
 
 
 def test_broken_toml_is_refused(tmp_path: Path) -> None:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
+import os
+import shutil
+import signal
+import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +18,12 @@ from height_maps import Solid, height_map
 
 from mpgrasp import rasteriser
 from mpgrasp.detectors.antipodal import WorldGrasps
-from mpgrasp.exceptions import CameraError, ConfigError, OutputError
+from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError, OutputError
 from mpgrasp.geometry import invert, transform_points
+from mpgrasp.training import generate as generating
 from mpgrasp.training import shards, views
 from mpgrasp.training.__main__ import main
-from mpgrasp.training.generate import GenerateConfig, generate, make_scene, make_views
+from mpgrasp.training.generate import GenerateConfig, Job, generate, make_scene, make_views
 from mpgrasp.training.verification import GOOD, TRIAL_COLUMNS, Verified
 from mpgrasp.training.views import (
     CAMERA_HEIGHT,
@@ -149,10 +156,92 @@ def test_finished_shards_are_kept_and_missing_ones_made_again(
     assert made[0].stat().st_mtime_ns == stamp
 
 
+def stored(config: GenerateConfig, out: Path) -> None:
+    """Shards with nothing but the scene of each row, and their description."""
+    shards.prepare(config, out)
+    for path, scenes in shards.planned(config, out).items():
+        meta = np.zeros((len(scenes) * config.views, len(META_COLUMNS)), np.float32)
+        meta[:, META_COLUMNS.index("scene")] = np.repeat(scenes, config.views)
+        shards.write_shard(path, {"meta": meta})
+
+
+def scenes(count: int) -> GenerateConfig:
+    return dataclasses.replace(CONFIG, scenes=count)
+
+
+def test_a_set_that_grows_writes_its_short_last_shard_again(tmp_path: Path) -> None:
+    stored(scenes(30), tmp_path)
+    assert shards.unfinished(scenes(30), tmp_path) == {}
+    assert shards.unfinished(scenes(60), tmp_path) == {
+        tmp_path / "shard_00001.npz": range(20, 40),
+        tmp_path / "shard_00002.npz": range(40, 60),
+    }
+
+
+@pytest.mark.parametrize("count", [59, 40, 30, 1])
+def test_scenes_beyond_the_last_are_refused_and_left_alone(count: int, tmp_path: Path) -> None:
+    stored(scenes(60), tmp_path)
+    before = digests(sorted(tmp_path.iterdir()))
+    with pytest.raises(ConfigError, match=f"beyond the last one.*shard_00002.npz.*more than {count} scenes"):
+        generate(scenes(count), tmp_path, progress=False)
+    assert digests(sorted(tmp_path.iterdir())) == before
+
+
+@pytest.mark.parametrize("content", [b"", b"junk", b"PK\x03\x04 junk"])
+def test_a_shard_that_cannot_be_read_is_written_again(content: bytes, tmp_path: Path) -> None:
+    stored(scenes(40), tmp_path)
+    broken = tmp_path / "shard_00001.npz"
+    broken.write_bytes(content)
+    assert shards.unfinished(scenes(40), tmp_path) == {broken: range(20, 40)}
+
+
+def copied(made: list[Path], job: Job) -> None:
+    _, scenes, path = job
+    shutil.copyfile(made[scenes[0]], path)
+
+
+def copied_until_killed(made: list[Path], job: Job) -> None:
+    """Copies the first shard; the worker of the second is killed once that is done."""
+    _, scenes, path = job
+    while scenes[0] == 1 and not (path.parent / made[0].name).is_file():
+        time.sleep(0.01)
+    if scenes[0] == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    copied(made, job)
+
+
+def test_a_killed_worker_is_one_clear_error_and_the_same_command_goes_on(
+    made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shards, "SHARD_SCENES", 1)
+    monkeypatch.setattr(generating, "_write_shard", partial(copied_until_killed, made))
+    with pytest.raises(MpgraspError, match=r"worker process was killed.*finished shards are kept"):
+        generate(CONFIG, tmp_path, workers=2, progress=False)
+    assert [path.name for path in tmp_path.glob("shard_*")] == ["shard_00000.npz"]
+    monkeypatch.setattr(generating, "_write_shard", partial(copied, made))
+    assert digests(generate(CONFIG, tmp_path, workers=2, progress=False)) == digests(made)
+
+
+def test_a_description_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError, match="No space left"):
+        shards.prepare(CONFIG, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_directory_with_other_data_is_refused(made: list[Path]) -> None:
     other = GenerateConfig(scenes=2, seed=5, views=2, camera="ray", colour=False)
-    with pytest.raises(ConfigError, match="other data"):
+    with pytest.raises(ConfigError, match=r"other data \(seed: 0 there, 5 here\)"):
         generate(other, made[0].parent, progress=False)
+
+
+def test_data_of_another_format_is_not_added_to(tmp_path: Path) -> None:
+    (tmp_path / "meta.json").write_text(json.dumps(shards.describe(CONFIG) | {"format": 2}))
+    with pytest.raises(ConfigError, match=r"other data \(format: 2 there, \d+ here\)"):
+        generate(CONFIG, tmp_path, progress=False)
 
 
 def test_a_file_in_the_way_is_one_clear_error(tmp_path: Path) -> None:

@@ -16,7 +16,9 @@ PACKAGE = Path(mpgrasp.__file__).parent
 
 PERCEPTION, WORLD = "perception", "world"
 ROWS: dict[str, tuple[int, str]] = {
-    **dict.fromkeys(["exceptions", "paths", "geometry", "plain", "result_cache"], (1, "")),
+    **dict.fromkeys(
+        ["exceptions", "paths", "geometry", "plain", "replace_file", "result_cache", "command_line"], (1, "")
+    ),
     **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp", "false_colour"], (2, "")),
     **dict.fromkeys(["detectors", "grid_map", "entropy"], (3, PERCEPTION)),
     **dict.fromkeys(

@@ -286,9 +286,7 @@ def test_command_writes_the_scene_of_a_suite(tmp_path: Path, capsys: pytest.Capt
 def test_bad_command_gets_one_line_and_exit_code_two(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    try:
-        code = main(arguments)
-    except SystemExit as caught:
-        code = int(str(caught.code))
-    assert code == 2
-    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("mpgrasp: error: ")
+    assert error.count("\n") == 1

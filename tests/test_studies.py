@@ -58,6 +58,15 @@ def test_every_pair_is_compared_and_unequal_numbers_of_answers_are_refused(study
         study.paired({"a": [True], "b": [True, False]})
 
 
+def test_tests_are_corrected_over_all_of_a_study(study: ModuleType) -> None:
+    answers = {"a": [True] * 8, "b": [False] * 8, "c": [True] * 8}  # p is 2 / 2^8, 1 and 2 / 2^8
+    tests = [{"metric": metric, **row} for metric in ("hit", "lifted") for row in study.paired(answers)]
+    found = study.corrected(tests)
+    assert [{k: v for k, v in row.items() if k != "p_holm"} for row in found] == tests
+    assert [row["p_holm"] for row in found] == pytest.approx([6 * 2 / 2**8, 1.0, 6 * 2 / 2**8] * 2)
+    assert study.corrected([]) == []
+
+
 def test_a_kept_result_is_not_made_again_and_other_settings_are_refused(
     study: ModuleType, tmp_path: Path
 ) -> None:
@@ -252,6 +261,7 @@ def test_every_detector_is_judged_on_the_same_views_and_its_grasps_are_executed(
     ]
     assert (test["only_a"], test["only_b"]) == (5, 0)
     assert test["p"] == pytest.approx(2 / 2**5)
+    assert test["p"] < test["p_holm"] <= len(results["mcnemar"]) * test["p"]
     assert results["calibration"]["sure"]["ece"] == pytest.approx(0.2)
     assert results["calibration"]["shy"]["brier"] == pytest.approx(0.09)
     assert results["calibration"]["blind"]["n"] == 0
@@ -323,6 +333,7 @@ def test_an_interrupted_ablation_goes_on_and_gives_what_it_would_have_given(
     assert [run["label"] for run in results["runs"]] == ["d all", "d highest"]
     assert all([p["epoch"] for p in run["curve"]] == [1, 2] for run in results["runs"])
     assert {row["n"] for row in results["mcnemar"]} == {6}
+    assert all(row["p"] <= row["p_holm"] <= 1 for row in results["mcnemar"])
     lost = tmp_path / "runs" / "d-highest-0.json"
     first = json.loads(lost.read_text())["result"]
     lost.unlink()
@@ -406,7 +417,7 @@ def test_unusable_input_is_one_line_and_exit_code_2(
     where = [] if "--out" in command else ["--out", str(tmp_path)]
     assert module(name).main([*command, *where]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(f"{name}: error: ")
+    assert error.startswith("mpgrasp: error: ")
     assert error.count("\n") == 1
     assert message in error
 

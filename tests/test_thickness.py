@@ -195,6 +195,6 @@ def test_unusable_input_is_one_line_and_exit_code_2(
 ) -> None:
     assert thickness.main(command) == 2
     error = capsys.readouterr().err
-    assert error.startswith("thickness: error: ")
+    assert error.startswith("mpgrasp: error: ")
     assert error.count("\n") == 1
     assert message in error

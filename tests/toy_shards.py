@@ -13,6 +13,7 @@ import numpy as np
 
 from mpgrasp.geometry import looking_down
 from mpgrasp.training.labels import encode_angle, encode_depth
+from mpgrasp.training.shards import FORMAT
 
 DIRECTIONS = (0.4, -1.1)
 """Closing directions, an odd angle and the one at right angles to it, nearly [rad]."""
@@ -58,7 +59,9 @@ def write_shards(
     """Shards of `images` images, each of its own scene."""
     rng = np.random.default_rng(seed)
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / "meta.json").write_text(json.dumps({"format": 2, "seed": seed, "meta_columns": COLUMNS}))
+    (directory / "meta.json").write_text(
+        json.dumps({"format": FORMAT, "seed": seed, "meta_columns": COLUMNS})
+    )
     for k in range(shards):
         rows = [toy_image(rng, size) for _ in range(images)]
         arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}

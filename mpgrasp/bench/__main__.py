@@ -9,10 +9,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.bench.command_line import Parser
-from mpgrasp.exceptions import ConfigError, MpgraspError
+from mpgrasp.command_line import Parser, run_command
+from mpgrasp.exceptions import ConfigError
 
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
 SUBCOMMANDS = {"compare": "compare", "replay": "replay", "report": "html_report"}
 """Words in the place of SUITE that do something with runs that are there, and the module of each."""
 
@@ -164,8 +163,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--hang-after",
         metavar="S",
         type=float,
-        default=HANG_AFTER,
-        help=f"seconds after which an episode's process is taken for hung (default: {HANG_AFTER:g})",
+        help="seconds after which an episode's process is taken for hung (default: "
+        f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )
     add("--quiet", action="store_true", help="no progress, only the table")
     return parser
@@ -175,7 +174,7 @@ def parse(command: Sequence[str]) -> argparse.Namespace:
     """Arguments of a run, those of a resumed one taken from its run.json.
 
     Raises:
-        ConfigError: unusable arguments.
+        ConfigError: unusable arguments, or a file of the resumed run that is not there any more.
         OutputError: nothing to resume.
     """
     parser = make_parser()
@@ -189,11 +188,9 @@ def parse(command: Sequence[str]) -> argparse.Namespace:
     if arguments.out is not None:
         raise ConfigError("--out beside --resume", got=str(arguments.out), allowed="one of both")
     if arguments.suite is None:
-        from mpgrasp.bench.description import command_of
-        from mpgrasp.bench.run_files import read_run
+        from mpgrasp.bench.recorded_command import recorded_arguments
 
-        before = command_of(read_run(arguments.resume), arguments.resume)
-        arguments = parser.parse_args([*before, *command])
+        arguments = recorded_arguments(arguments.resume, parser, command)
     arguments.out = arguments.resume
     return arguments
 
@@ -203,21 +200,19 @@ def main(command: Sequence[str] | None = None) -> int:
     # before numpy and torch are loaded: results must not depend on how many cores there are
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    command = sys.argv[1:] if command is None else command
-    try:
-        if command and command[0] in SUBCOMMANDS:
-            module = importlib.import_module(f"mpgrasp.bench.{SUBCOMMANDS[command[0]]}")
-            code: int = module.main(command[1:])
-            return code
-        arguments = parse(command)
-        from mpgrasp.bench.run import run
+    words = sys.argv[1:] if command is None else command
+    return run_command(lambda: _run(words))
 
-        return run(arguments, command)
-    except MpgraspError as error:
-        print("mpgrasp: error:", " ".join(str(error).splitlines()), file=sys.stderr)
-        return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+
+def _run(command: Sequence[str]) -> int:
+    if command and command[0] in SUBCOMMANDS:
+        module = importlib.import_module(f"mpgrasp.bench.{SUBCOMMANDS[command[0]]}")
+        code: int = module.main(command[1:])
+        return code
+    arguments = parse(command)
+    from mpgrasp.bench.run import run
+
+    return run(arguments, command)
 
 
 if __name__ == "__main__":

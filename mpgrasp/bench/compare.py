@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from mpgrasp.bench.cell_path import CellName, read_cells
-from mpgrasp.bench.command_line import Parser
-from mpgrasp.bench.pairing import Pairing, pair
+from mpgrasp.bench.pairing import Pairing, pair, pair_worlds
 from mpgrasp.bench.report import wide_console
 from mpgrasp.bench.run_files import read_run
-from mpgrasp.bench.statistics import SIGNIFICANCE, holm
-from mpgrasp.bench.summary import Cells
+from mpgrasp.bench.statistics import SIGNIFICANCE, holm, restricted, wilcoxon
+from mpgrasp.bench.summary import Cells, restricted_time
+from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.plain import difference
 
@@ -26,9 +28,12 @@ _SHARED = ("suite", "episode", "seed", "camera", "noise")
 _EPILOG = """\
 A and B are folders of runs, or single cells of them: RUN/DETECTOR/CONTROLLER. Cells of the same name are
 compared; where there is one on each side, it may have any name. Episodes are paired by suite, seed and
-number. p is McNemar's exact test, two-sided; with several cells it is corrected after Holm.
+number. Success: McNemar's exact test. Where tables are cleared, also the times, cut off at the limit, which
+is what a table that was not cleared counts as: Wilcoxon's signed-rank test. Both are two-sided, and p is
+corrected after Holm over all tests.
 
-exit code: 0 B is not significantly worse, 1 B is (p < 0.05), 2 unusable input.
+exit code: 0 B is not worse, 1 B is: it succeeds less often or takes longer (p < 0.05), or has errors in
+episodes that A played; 2 unusable input.
 """
 
 
@@ -45,8 +50,49 @@ def make_parser() -> Parser:
     return parser
 
 
-def compare(a: Cells, b: Cells) -> list[tuple[CellName, CellName, Pairing, float]]:
-    """(cell of A, cell of B, their pairing, p after Holm's correction) for all cells in common.
+@dataclass(frozen=True, kw_only=True)
+class TimeTest:
+    """How long two cells took to clear the same tables, cut off at the limit; who did not, took the limit."""
+
+    mean_a: float
+    """[s]"""
+    mean_b: float
+    """[s]"""
+    p: float
+    """Two-sided, of Wilcoxon's signed-rank test."""
+    slower: bool
+    """Whether B's times tend to be the longer ones, significantly or not."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A cell of A beside one of B."""
+
+    a: CellName
+    b: CellName
+    pairing: Pairing
+    times: TimeTest | None
+    """None unless both cleared tables."""
+    p_success: float = math.nan
+    """Of McNemar's test, after Holm's correction; NaN where there is no episode that both played."""
+    p_times: float = math.nan
+
+    @property
+    def differences(self) -> dict[str, bool]:
+        """What is to be said of B, and whether it makes B worse; empty if there is no difference."""
+        found = {}
+        if self.p_success < SIGNIFICANCE:
+            worse = self.pairing.rate_b < self.pairing.rate_a
+            found["B is worse" if worse else "B is better"] = worse
+        if self.times is not None and self.p_times < SIGNIFICANCE:
+            found["B is slower" if self.times.slower else "B is faster"] = self.times.slower
+        if self.pairing.lost:
+            found["B has errors"] = True
+        return found
+
+
+def compare(a: Cells, b: Cells) -> list[Comparison]:
+    """All cells in common, with p after Holm's correction over all tests of all of them.
 
     Raises:
         ConfigError: no cell or no episode in common.
@@ -55,16 +101,41 @@ def compare(a: Cells, b: Cells) -> list[tuple[CellName, CellName, Pairing, float
         couples = [(next(iter(a)), next(iter(b)))]
     else:
         couples = [(name, name) for name in a if name in b]
-    pairings = [(CellName(*x), CellName(*y), pair(a[x], b[y])) for x, y in couples]
-    pairings = [found for found in pairings if found[2].n]
-    if not pairings:
+    rows = [
+        Comparison(a=CellName(*x), b=CellName(*y), pairing=pair(a[x], b[y]), times=compare_times(a[x], b[y]))
+        for x, y in couples
+    ]
+    rows = [row for row in rows if row.pairing.n or row.pairing.lost]
+    if not rows:
         raise ConfigError(
             "the runs have no episode in common",
             got=[[f"{n.suite}/{n}" for n in map(CellName._make, cells)] for cells in (a, b)],
             allowed="cells of the same names or one on each side, with the same suite and seed",
         )
-    corrected = holm([pairing.p for _, _, pairing in pairings])
-    return [(*found, p) for found, p in zip(pairings, corrected, strict=True)]
+    success = [row.pairing.p for row in rows if row.pairing.n]
+    corrected = holm([*success, *(row.times.p for row in rows if row.times)])
+    of_success, of_times = iter(corrected[: len(success)]), iter(corrected[len(success) :])
+    return [
+        replace(
+            row,
+            p_success=next(of_success) if row.pairing.n else math.nan,
+            p_times=next(of_times) if row.times else math.nan,
+        )
+        for row in rows
+    ]
+
+
+def compare_times(a: Sequence[Mapping[str, Any]], b: Sequence[Mapping[str, Any]]) -> TimeTest | None:
+    """Test the times of two cells over the tables that both had to clear; None if there are none."""
+    pairs = [(x, y) for x, y in pair_worlds(a, b) if "time_limit_s" in x and "time_limit_s" in y]
+    if not pairs:
+        return None
+    limit = min(line["time_limit_s"] for both in pairs for line in both)  # the same for A and B
+    times_a, times_b = (
+        restricted([restricted_time(line) for line in side], limit) for side in zip(*pairs, strict=True)
+    )
+    p, slower = wilcoxon(times_b - times_a)
+    return TimeTest(mean_a=float(times_a.mean()), mean_b=float(times_b.mean()), p=p, slower=slower)
 
 
 def main(command: Sequence[str]) -> int:
@@ -76,38 +147,58 @@ def main(command: Sequence[str]) -> int:
     arguments = make_parser().parse_args(command)
     (folder_a, a), (folder_b, b) = read_cells(arguments.a), read_cells(arguments.b)
     rows = compare(a, b)
+    print(f"A = {folder_a}\nB = {folder_b}")
+    before, after = (read_run(folder)["configuration"] for folder in (folder_a, folder_b))
+    for key in _SHARED:
+        changed = difference(before.get(key), after.get(key), key)
+        if changed:
+            print(f"Not the same in both: {changed.words('in A', 'in B')}")
+    for side, cells, shown in (("A", a, {row.a for row in rows}), ("B", b, {row.b for row in rows})):
+        alone = [f"{name.suite}/{name}" for name in map(CellName._make, cells) if name not in shown]
+        if alone:
+            print(f"In {side} alone, so not compared: {', '.join(alone)}")
+    wide_console().print(_table(rows))
+    lost = [(row.pairing.lost, row.pairing.lost + row.pairing.n, row.b) for row in rows if row.pairing.lost]
+    if lost:
+        text = ", ".join(f"{k} of {n} of {name.suite}/{name}" for k, n, name in lost)
+        print(f"B is worse: episodes that A played are errors in B: {text}")
+    return EXIT_WORSE if any(worse for row in rows for worse in row.differences.values()) else 0
+
+
+def _table(rows: Sequence[Comparison]) -> Table:
+    errors = any(row.pairing.errors_a or row.pairing.errors_b for row in rows)
+    times = any(row.times for row in rows)
     table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
     for heading in ("suite", "A", "B"):
         table.add_column(heading, overflow="fold")
     for heading in (
-        "n", "A %", "B %", "A alone", "B alone", "p", "B - A, s\n(95 %)", "same\noutcome", "bit for\nbit",
+        "n", *(["errors\nA, B"] if errors else []), "A %", "B %", "A alone", "B alone", "p",
+        "B - A, s\n(95 %)", *(["A, s", "B, s", "p of\ntimes"] if times else []),
+        "same\noutcome", "bit for\nbit",
     ):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict")
-    worse = False
-    for cell_a, cell_b, found, p in rows:
-        significant = p < SIGNIFICANCE
-        worse |= significant and found.rate_b < found.rate_a
+    for row in rows:
+        found = row.pairing
         table.add_row(
-            cell_a.suite, str(cell_a), str(cell_b), str(found.n),
-            f"{100 * found.rate_a:.1f}", f"{100 * found.rate_b:.1f}",
-            str(found.a_alone), str(found.b_alone), f"{p:.3g}", _time(found),
-            str(found.same_outcome), str(found.identical), _verdict(found, significant),
+            row.a.suite, str(row.a), str(row.b), str(found.n),
+            *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
+            _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
+            _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),
+            str(found.same_outcome), str(found.identical),
+            ", ".join(row.differences) or "no significant difference",
         )  # fmt: skip
-    print(f"A = {folder_a}\nB = {folder_b}")
-    before, after = (read_run(folder)["configuration"] for folder in (folder_a, folder_b))
-    for key in _SHARED:
-        text = difference(before.get(key), after.get(key), key)
-        if text:
-            print(f"Not the same in both: {text.replace(' there', ' in A').replace(' here', ' in B')}")
-    wide_console().print(table)
-    return EXIT_WORSE if worse else 0
+    return table
 
 
-def _verdict(found: Pairing, significant: bool) -> str:
-    if not significant:
-        return "no significant difference"
-    return "B is better" if found.rate_b > found.rate_a else "B is worse"
+def _clearing(row: Comparison) -> list[str]:
+    if row.times is None:
+        return ["-"] * 3
+    return [_number(row.times.mean_a), _number(row.times.mean_b), _number(row.p_times, ".3g")]
+
+
+def _number(value: float, how: str = ".1f") -> str:
+    return "-" if math.isnan(value) else f"{value:{how}}"
 
 
 def _time(found: Pairing) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -12,11 +12,9 @@ from typing import Any
 
 from mpgrasp.bench.plan import Plan
 from mpgrasp.bench.player import Player
+from mpgrasp.bench.recorded_command import PROGRAM
 from mpgrasp.bench.suite import Suite
-from mpgrasp.exceptions import OutputError
 from mpgrasp.plain import plain
-
-_PROGRAM = ("python", "-m", "mpgrasp.bench")
 
 
 def describe(plan: Plan, player: Player, command: Sequence[str]) -> dict[str, Any]:
@@ -31,18 +29,23 @@ def describe(plan: Plan, player: Player, command: Sequence[str]) -> dict[str, An
     several = len(cards) > 1
     return {
         "format": 1,
-        "command": shlex.join([*_PROGRAM, *command]),
+        "command": shlex.join([*PROGRAM, *command]),
         "started": datetime.now().astimezone().isoformat(timespec="seconds"),
         "configuration": configuration(plan, player),
         **cards[0],
         **({"worlds": {s.name: card for s, card in zip(plan.suites, cards, strict=True)}} if several else {}),
-        **({"objects": [verdict.card() for verdict in plan.objects]} if plan.objects else {}),
+        **(
+            {"objects": [_without_folder(verdict.card()) for verdict in plan.objects]} if plan.objects else {}
+        ),
         "made_with": provenance(),
     }
 
 
 def configuration(plan: Plan, player: Player) -> dict[str, Any]:
-    """All that decides what a run's lines say; of a programme, `suite` is the name and `suites` says more."""
+    """All that decides what a run's lines say; of a programme, `suite` is the name and `suites` says more.
+
+    Files are given by name and hash: where they lie decides nothing, and is nobody's business.
+    """
     from mpgrasp.bench.provenance import sha256
     from mpgrasp.detectors.detector import reads_truth
     from mpgrasp.paths import WEIGHTS
@@ -61,7 +64,7 @@ def configuration(plan: Plan, player: Player) -> dict[str, Any]:
         "detectors": [
             {
                 "name": name,
-                "weights": str(given) if (given := plan.weights.get(name)) else None,
+                "weights": given.name if (given := plan.weights.get(name)) else None,
                 # of the shipped weights where none are given; a plug-in's own are its own affair
                 "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
                 "reads_truth": reads_truth(detector),
@@ -106,16 +109,5 @@ def _object_card(item: Any) -> Any:
     return {**card, "parts": {"pieces": len(item.parts), "sha256": digest.hexdigest()}}
 
 
-def command_of(run: dict[str, Any], path: Path) -> list[str]:
-    """Arguments of the command that a run.json says it was made with.
-
-    Raises:
-        OutputError: it does not say.
-    """
-    try:
-        words = shlex.split(run["command"])
-    except (KeyError, ValueError, AttributeError) as error:
-        raise OutputError(
-            "run.json does not say by which command it was made", got=str(path), allowed="`command`"
-        ) from error
-    return words[len(_PROGRAM) :]
+def _without_folder(card: Mapping[str, Any]) -> dict[str, Any]:
+    return {**card, "file": Path(card["file"]).name}

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, kw_only=True)
 class Paragraph:
-    """Text; what stands between backticks is code."""
+    """Text; what stands between single backticks is code."""
 
     text: str
 
@@ -90,10 +90,11 @@ table{border-collapse:collapse;font-size:.875rem;font-variant-numeric:tabular-nu
 caption{text-align:left;font-weight:600;padding:.3rem 0}
 th,td{border:1px solid var(--line);padding:.25rem .55rem;text-align:left;vertical-align:top}
 th{background:var(--shade)}
-td{white-space:nowrap}
-td.long{white-space:normal;min-width:16rem}
+th,td{white-space:nowrap}
+th.long,td.long{white-space:normal;min-width:16rem}
+th.long{min-width:5.5rem}
 code,pre{font:.85em ui-monospace,monospace}
-pre{background:var(--shade);padding:.6rem;overflow-x:auto}
+pre{background:var(--shade);padding:.6rem;white-space:pre-wrap;overflow-wrap:anywhere}
 .note,figcaption{color:var(--soft);font-size:.875rem}
 .note{margin-top:-.5rem}
 .pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,24rem),1fr));gap:1rem;
@@ -109,6 +110,8 @@ summary{cursor:pointer}
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _LONG = 48
 """Characters from which on a cell of a table may be folded."""
+_LONG_HEADING = 14
+"""The same of a heading, which is folded into lines of about as many."""
 
 
 def to_html(title: str, sections: Sequence[Section]) -> str:
@@ -143,9 +146,9 @@ def to_html(title: str, sections: Sequence[Section]) -> str:
 
 def to_markdown(title: str, sections: Sequence[Section]) -> str:
     """The same without the pictures, of which it gives captions and descriptions."""
-    parts = [f"# {title}"]
+    parts = [f"# {_markdown(title)}"]
     for section in sections:
-        parts += [f"## {section.title}", *_markdown_blocks(section.blocks)]
+        parts += [f"## {_markdown(section.title)}", *_markdown_blocks(section.blocks)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -153,12 +156,22 @@ def _anchor(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
 
 
+def _pieces(text: str) -> list[str]:
+    """Text and code in turn; all is text where the backticks are not in pairs, or stand side by side."""
+    pieces = text.split("`")
+    return [text] if len(pieces) % 2 == 0 or "``" in text else pieces
+
+
 def _text(text: str) -> str:
     """Escaped text with its code marked up."""
-    pieces = html.escape(text, quote=True).split("`")
-    if len(pieces) % 2 == 0:  # an odd backtick is just that
-        return "`".join(pieces)
+    pieces = [html.escape(piece, quote=True) for piece in _pieces(text)]
     return "".join(f"<code>{piece}</code>" if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def _markdown(text: str) -> str:
+    """The same in one line of Markdown, in which there is no HTML."""
+    pieces = _pieces(" ".join(text.splitlines()))
+    return "`".join(piece if k % 2 else piece.replace("<", "&lt;") for k, piece in enumerate(pieces))
 
 
 def _html_blocks(blocks: Iterable[Block]) -> str:
@@ -185,7 +198,7 @@ def _html_block(block: Paragraph | Listing | Table | Folded) -> str:
         case Paragraph():
             return f"<p>{_text(block.text)}</p>"
         case Listing():
-            return f'<pre tabindex="0">{html.escape(chr(10).join(block.lines))}</pre>'
+            return f"<pre>{html.escape(chr(10).join(block.lines))}</pre>"
         case Table():
             return _html_table(block)
         case Folded():
@@ -199,7 +212,10 @@ def _html_picture(picture: Picture) -> str:
 
 
 def _html_table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{_text(h)}</th>' for h in table.headings)
+    head = "".join(
+        f'<th scope="col"{" class=long" if len(heading) > _LONG_HEADING else ""}>{_text(heading)}</th>'
+        for heading in table.headings
+    )
     rows = "\n".join(
         "<tr>"
         + "".join(f"<td{' class=long' if len(cell) > _LONG else ''}>{_text(cell)}</td>" for cell in row)
@@ -220,15 +236,16 @@ def _markdown_blocks(blocks: Iterable[Block]) -> list[str]:
     for block in blocks:
         match block:
             case Paragraph():
-                parts.append(block.text)
+                parts.append(_markdown(block.text))
             case Listing():
                 parts.append("\n".join(["```sh", *block.lines, "```"]))
             case Table():
-                parts += [f"**{block.caption}**", _markdown_table(block)]
+                parts += [f"**{_markdown(block.caption)}**", _markdown_table(block)]
                 if block.note:
-                    parts.append(block.note)
+                    parts.append(_markdown(block.note))
             case Picture():
-                parts.append(f"*Picture in report.html: {block.caption}* {block.alt}")
+                said = f"*Picture in report.html: {_markdown(block.caption)}* {_markdown(block.alt)}"
+                parts.append(said)
             case Folded():
                 inner = _markdown_blocks(block.blocks)
                 parts += [f"<details><summary>{_text(block.summary)}</summary>", *inner, "</details>"]
@@ -237,4 +254,9 @@ def _markdown_blocks(blocks: Iterable[Block]) -> list[str]:
 
 def _markdown_table(table: Table) -> str:
     rows = [list(table.headings), ["---"] * len(table.headings), *table.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows)
+    return "\n".join("| " + " | ".join(map(_markdown_cell, row)) + " |" for row in rows)
+
+
+def _markdown_cell(cell: str) -> str:
+    # backslashes before a bar would take its own one away
+    return re.sub(r"(\\*)\|", r"\1\1\\|", _markdown(cell))

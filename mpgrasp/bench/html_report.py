@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
-from mpgrasp.bench.command_line import Parser
 from mpgrasp.bench.document import Block, Paragraph, Section, to_html, to_markdown
 from mpgrasp.bench.hypotheses import evaluate
 from mpgrasp.bench.paper_tables import hypothesis_blocks, pair_table, paper_tables
@@ -17,7 +14,6 @@ from mpgrasp.bench.report_gallery import (
     motion_pictures,
     outcome_pictures,
     read_traces,
-    thickness_blocks,
 )
 from mpgrasp.bench.report_tables import (
     card_blocks,
@@ -26,10 +22,14 @@ from mpgrasp.bench.report_tables import (
     object_blocks,
     overview_table,
     run_blocks,
+    timing_blocks,
 )
+from mpgrasp.bench.report_thickness import thickness_blocks
 from mpgrasp.bench.run_reading import Runs, find_runs
 from mpgrasp.bench.summary import paired_tests, summarise
+from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import OutputError
+from mpgrasp.replace_file import replace_file
 
 FILES = ("report.html", "report.md")
 
@@ -96,6 +96,7 @@ def make_report(runs: Runs) -> tuple[str, list[Section]]:
     )
     if any(not run.complete for run in runs.runs):
         said += " Not all is there yet: a run is not complete."
+    thin = thickness_blocks(runs)
     pairs: list[Block] = [pair_table(tests)] if tests else [Paragraph(text="No two cells of one suite.")]
     sections = [
         Section(
@@ -113,7 +114,8 @@ def make_report(runs: Runs) -> tuple[str, list[Section]]:
                 *motion_pictures(runs, traced),
             ],
         ),
-        Section(title="Thin objects", blocks=thickness_blocks()),
+        *([Section(title="Thin objects", blocks=thin)] if thin else []),
+        Section(title="Where the time goes", blocks=timing_blocks(runs)),
         Section(title="Filmstrips", blocks=film_blocks(runs, traced)),
         Section(title="Failures", blocks=failure_blocks(runs)),
         Section(title="Runs", blocks=run_blocks(runs)),
@@ -124,14 +126,10 @@ def make_report(runs: Runs) -> tuple[str, list[Section]]:
 
 def _replace(file: Path, text: str) -> None:
     """Replace a file as a whole."""
-    temporary = file.with_name(f".{file.name}.tmp")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, file)
+        replace_file(file, text)
     except OSError as error:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
         raise OutputError(
             f"a report cannot be written ({error.strerror})",
             got=str(file),

@@ -1,7 +1,8 @@
 """The paper's orderings as hypotheses: tested in pairs over common worlds, and a verdict for each.
 
-Rates (success, reflex stops) by McNemar's exact test, times and distances by Wilcoxon's signed-rank test
-(Biometrics Bulletin 1, 1945); all two-sided, and corrected after Holm over all that could be tested.
+Rates (success, reflex stops) by McNemar's exact test, times and distances by Wilcoxon's signed-rank test;
+all two-sided, and corrected after Holm over all that could be decided. A claim over too few worlds for any p
+below the level of significance is no test, and left out (Tarone, Biometrics 46, 1990).
 """
 
 from __future__ import annotations
@@ -15,9 +16,8 @@ import numpy as np
 
 from mpgrasp.bench.pairing import pair_worlds
 from mpgrasp.bench.paper_results import CLAIMS, CONTROLLERS, METHODS, Claim, Measure
-from mpgrasp.bench.statistics import SIGNIFICANCE, holm, mcnemar
-from mpgrasp.bench.summary import Cells, time_limits
-from mpgrasp.geometry import FloatArray
+from mpgrasp.bench.statistics import FEWEST_PAIRS, SIGNIFICANCE, holm, mcnemar, wilcoxon
+from mpgrasp.bench.summary import Cells, restricted_time, time_limits
 
 
 class Verdict(StrEnum):
@@ -28,6 +28,8 @@ class Verdict(StrEnum):
     NOT_CONFIRMED = "not confirmed"
     CONTRADICTED = "contradicted"
     """Significant, in the other direction."""
+    UNDECIDABLE = "cannot be decided"
+    """Over so few worlds that it could not be significant, whatever came out."""
     ABSENT = "not tested"
     """Cells or measurements are absent."""
 
@@ -45,6 +47,7 @@ class Finding:
     worse: float = np.nan
     p: float = np.nan
     p_holm: float = np.nan
+    """NaN where the claim cannot be decided."""
     absent: str = ""
     """What is missing, in words."""
     agrees: bool = False
@@ -67,7 +70,7 @@ def cell_of(cells: Cells, suite: str, method: str, controller: str) -> tuple[str
 def evaluate(cells: Cells, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:
     """One finding per claim, in their order."""
     findings = [_test(claim, cells) for claim in claims]
-    tested = [k for k, found in enumerate(findings) if not found.absent]
+    tested = [k for k, f in enumerate(findings) if f.verdict not in (Verdict.ABSENT, Verdict.UNDECIDABLE)]
     for k, p in zip(tested, holm([findings[k].p for k in tested]), strict=True):
         found, verdict = findings[k], Verdict.NOT_CONFIRMED
         if p < SIGNIFICANCE:
@@ -100,10 +103,10 @@ def _test(claim: Claim, cells: Cells) -> Finding:
     if claim.measure in (Measure.SUCCESS, Measure.REFLEX):
         p, agrees = mcnemar(int(np.sum(gain > 0)), int(np.sum(gain < 0))), gain.sum() > 0
     else:
-        p, agrees = _wilcoxon(gain)
+        p, agrees = wilcoxon(gain)
     return Finding(
         claim=claim,
-        verdict=Verdict.NOT_CONFIRMED,
+        verdict=Verdict.UNDECIDABLE if len(pairs) < FEWEST_PAIRS else Verdict.NOT_CONFIRMED,
         n=len(pairs),
         better=float(better.mean()),
         worse=float(worse.mean()),
@@ -120,24 +123,10 @@ def _with_value(line: Mapping[str, Any], measure: Measure, limit: float | None) 
         case Measure.REFLEX:
             value = line.get("reflex") is not None
         case Measure.TIME:
-            value = line.get("sim_time_s")
-            allowed = line.get("time_limit_s", limit)
-            if value is not None and allowed is not None:
-                # who has not got to the end took at least as long as is allowed
-                value = min(value, allowed) if line.get("success") else allowed
+            value = None if line.get("sim_time_s") is None else restricted_time(line, limit)
         case Measure.DRIFT:
             value = line.get("blind_drift_m")
     return {**line, "value": value}
-
-
-def _wilcoxon(gain: FloatArray) -> tuple[float, bool]:
-    """Two-sided p of the signed-rank test, and whether the gain is the positive one."""
-    from scipy.stats import wilcoxon
-
-    if not np.any(gain):
-        return 1.0, False
-    up = float(wilcoxon(gain, alternative="greater").pvalue)
-    return float(wilcoxon(gain).pvalue), up < 0.5
 
 
 def count_verdicts(findings: Iterable[Finding]) -> dict[Verdict, int]:

@@ -18,7 +18,12 @@ class Pairing:
     """What two sets of episodes have in common."""
 
     n: int
-    """Worlds that both met."""
+    """Worlds that both played."""
+    errors_a: int
+    """Error rows of A, whether B played these worlds or not."""
+    errors_b: int
+    lost: int
+    """Worlds that A played and of which B has an error row alone."""
     both: int
     """Worlds in which both succeeded."""
     a_alone: int
@@ -36,22 +41,25 @@ class Pairing:
 
     @property
     def rate_a(self) -> float:
-        """A's success rate over the common worlds; NaN where there are none."""
+        """A's success rate over the worlds that both played; NaN where there are none."""
         return (self.both + self.a_alone) / self.n if self.n else np.nan
 
     @property
     def rate_b(self) -> float:
-        """B's success rate over the common worlds; NaN where there are none."""
+        """B's success rate over the worlds that both played; NaN where there are none."""
         return (self.both + self.b_alone) / self.n if self.n else np.nan
 
 
 def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pairing:
-    """Pair the lines of two cells by suite, seed and episode; error rows count for neither.
+    """Pair the lines of two cells by suite, seed and episode; error rows are counted apart.
 
     Raises:
         ConfigError: the same episode had another scene in the other run, or occurs twice.
     """
+    a, b = list(a), list(b)
     pairs = pair_worlds(a, b)
+    errors_a, errors_b = ([line for line in lines if line["outcome"] == ERROR] for lines in (a, b))
+    lost = ({_world(line) for line in errors_b} & _by_world(a).keys()) - _by_world(b).keys()
     wins = [(bool(one["success"]), bool(other["success"])) for one, other in pairs]
     times = [
         other["sim_time_s"] - one["sim_time_s"] for one, other in pairs if one["success"] and other["success"]
@@ -60,6 +68,9 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
     a_alone, b_alone = wins.count((True, False)), wins.count((False, True))
     return Pairing(
         n=len(pairs),
+        errors_a=len(errors_a),
+        errors_b=len(errors_b),
+        lost=len(lost),
         both=wins.count((True, True)),
         a_alone=a_alone,
         b_alone=b_alone,
@@ -95,10 +106,14 @@ def pair_worlds(
 def _by_world(lines: Iterable[Mapping[str, Any]]) -> dict[Hashable, Mapping[str, Any]]:
     worlds: dict[Hashable, Mapping[str, Any]] = {}
     for line in lines:
-        key = (line["suite"], line["seed"], line["episode"])
+        key = _world(line)
         if line["outcome"] == ERROR:
             continue
         if key in worlds:
             raise ConfigError("an episode occurs twice in one cell", got=key, allowed="one line each")
         worlds[key] = line
     return worlds
+
+
+def _world(line: Mapping[str, Any]) -> Hashable:
+    return line["suite"], line["seed"], line["episode"]

@@ -22,7 +22,7 @@ from mpgrasp.bench.paper_results import (
     reported,
 )
 from mpgrasp.bench.run_reading import Cell, Runs, name_of
-from mpgrasp.bench.statistics import SIGNIFICANCE, wilson_interval
+from mpgrasp.bench.statistics import FEWEST_PAIRS, SIGNIFICANCE, wilson_interval
 
 ABSENT = "not run"
 REFERENCE = ("DHRNet", "MP-PC")
@@ -63,9 +63,13 @@ def hypothesis_blocks(findings: Sequence[Finding]) -> list[Block]:
     said = ", ".join(f"{n} {verdict}" for verdict, n in count_verdicts(findings).items() if n)
     tested = [found for found in findings if found.verdict is not Verdict.ABSENT]
     absent = [found for found in findings if found.verdict is Verdict.ABSENT]
-    blocks: list[Block] = [
-        Paragraph(text=f"{len(findings)} orderings that the paper claims of its physical trials: {said}.")
-    ]
+    text = f"{len(findings)} orderings that the paper claims of its physical trials: {said}."
+    if any(found.verdict is Verdict.UNDECIDABLE for found in findings):
+        text += (
+            f" Those that cannot be decided were played in so few worlds that p could not fall below "
+            f"{SIGNIFICANCE:g}, whatever came out; from {FEWEST_PAIRS} worlds on they could be."
+        )
+    blocks: list[Block] = [Paragraph(text=text)]
     if tested:
         table = Table(
             caption="The paper's orderings as hypotheses",
@@ -73,7 +77,8 @@ def hypothesis_blocks(findings: Sequence[Finding]) -> list[Block]:
             rows=[_finding_row(found) for found in tested],
             note=f"Confirmed or contradicted: Holm p < {SIGNIFICANCE:g} in or against the direction claimed. "
             "n: worlds that both met. Rates by McNemar's exact test, times and distances by Wilcoxon's "
-            "signed-rank test, two-sided; Holm's correction is over this table.",
+            "signed-rank test, two-sided; Holm's correction is over all claims of this table that can be "
+            "decided.",
         )
         blocks.append(table)
     if absent:
@@ -96,7 +101,7 @@ def pair_table(tests: Tests) -> Table:
             )
             for test in tests
         ],
-        note=f"* significant: Holm p < {SIGNIFICANCE:g}, corrected over this table.",
+        note=f"* significant: Holm p < {SIGNIFICANCE:g}, corrected over the pairs of a suite.",
     )  # fmt: skip
 
 
@@ -144,7 +149,10 @@ def _rates(suite: str, runs: Runs, rows: Rows, tests: Tests) -> Table:
         for cell in runs.cells
         if cell[0] == suite and cell not in shown
     ]
-    note = f"95 % Wilson intervals. The last column: Holm p of McNemar's test, * below {SIGNIFICANCE:g}."
+    note = (
+        "95 % Wilson intervals. The last column: p of McNemar's test, corrected after Holm over all pairs of "
+        f"cells of the suite, * below {SIGNIFICANCE:g}."
+    )
     if suite == "single":
         note += f" The paper does not say by which controller; {SINGLE_CONTROLLER} here."
     against = " + ".join(REFERENCE)
@@ -262,7 +270,7 @@ def _finding_row(found: Finding) -> tuple[str, ...]:
             values = f"{found.better:.3f} m, {found.worse:.3f} m"
     return (
         found.claim.suite, _claim_text(found.claim), found.claim.source, str(found.n), values,
-        f"{found.p:.3g}", f"{found.p_holm:.3g}", str(found.verdict),
+        f"{found.p:.3g}", "-" if math.isnan(found.p_holm) else f"{found.p_holm:.3g}", str(found.verdict),
     )  # fmt: skip
 
 

@@ -138,6 +138,17 @@ class Plan:
         """Episodes of each cell in a suite; with `until_ci` those that are added at a time."""
         return suite.trials if self.episodes is None else self.episodes
 
+    def place(self, task: Task) -> tuple[int, ...]:
+        """Where a task stands in the order of the plan: of two tasks, the one with the lesser place is first.
+
+        What the plan does not have comes after everything that it has.
+        """
+        suites, cells = [suite.name for suite in self.suites], self.cells
+        cell = Cell(task.detector, task.controller)
+        if task.suite not in suites or cell not in cells:
+            return (len(suites),)
+        return suites.index(task.suite), task.episode, cells.index(cell)
+
     def tasks(self) -> list[Task]:
         """A batch of every suite, in order."""
         return [task for suite in self.suites for task in self.tasks_of(suite, 0, self.batch(suite))]

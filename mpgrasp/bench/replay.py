@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.cell_path import find_cell
-from mpgrasp.bench.command_line import Parser
-from mpgrasp.bench.description import command_of, configuration
+from mpgrasp.bench.description import configuration
 from mpgrasp.bench.plan import Cell, Plan, Task
 from mpgrasp.bench.player import ERROR, Line, Player
 from mpgrasp.bench.provenance import provenance
+from mpgrasp.bench.recorded_command import recorded_arguments
 from mpgrasp.bench.run import make_plan
 from mpgrasp.bench.run_files import read_lines, read_run
+from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.plain import difference, plain
 
@@ -47,6 +48,13 @@ def make_parser() -> Parser:
         help="[suite/]detector/controller; may be left out where the run has one cell",
     )
     add("--record", action="store_true", help="record it, for rerun and as GIF")
+    add(
+        "--weights",
+        metavar="[D=]FILE",
+        action="append",
+        default=[],
+        help="where the weights that the run was given are now, unless they are where they were",
+    )
     add("--out", metavar="DIR", type=Path, help="folder of the recording (default: RUN/recordings)")
     return parser
 
@@ -61,7 +69,8 @@ def main(command: Sequence[str]) -> int:
 
     arguments = make_parser().parse_args(command)
     run = read_run(arguments.run)
-    plan, _ = make_plan(run_parser().parse_args(command_of(run, arguments.run)))
+    given = [word for file in arguments.weights for word in ("--weights", file)]
+    plan, _ = make_plan(recorded_arguments(arguments.run, run_parser(), given))
     plan, task = _one_episode(plan, arguments)
     before = _recorded_line(arguments.run, plan, task)
     player = Player(plan)
@@ -70,7 +79,7 @@ def main(command: Sequence[str]) -> int:
         print(f"The configuration is another one: {changed}")
     made_with = difference(run.get("made_with"), plain(provenance()))
     if made_with:
-        print(f"Not made with the same: {made_with}")
+        print(f"Not made with the same: {made_with.words('then', 'now')}")
     line = plain(player.play(task))
     if plan.record:
         print(f"Recorded: {plan.recordings}/{task.stem}.*")
@@ -112,7 +121,7 @@ def _difference_of_configurations(then: dict[str, Any], now: dict[str, Any], tas
     names = {"detectors": task.detector, "controllers": task.controller}
     kept = {key: [item for item in then[key] if item["name"] == name] for key, name in names.items()}
     found = difference({**then, **kept, "cells": now["cells"]}, now)
-    return found and found.replace(" there", " then").replace(" here", " now")
+    return found and found.words("then", "now")
 
 
 def _report(task: Task, before: Line, now: Line) -> int:

@@ -172,7 +172,7 @@ class ProgressReport:
         self._start = time.monotonic()
         if self._bar:
             self._bar.reset(self._task, completed=self._done, successes=self._successes)
-        elif played:
+        elif played and not self._quiet:
             self.note(f"{len(played)} episodes are there already")
 
     def expect(self, total: int) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import html
-import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.document import Block, Paragraph, Picture
@@ -19,7 +17,6 @@ from mpgrasp.bench.report_pictures import (
     data_uri,
     singular_picture,
     success_picture,
-    thickness_picture,
     time_picture,
     way_picture,
 )
@@ -27,10 +24,6 @@ from mpgrasp.bench.run_reading import Cell, Runs, name_of
 from mpgrasp.bench.statistics import wilson_interval
 from mpgrasp.bench.trace import Trace
 from mpgrasp.exceptions import MpgraspError
-from mpgrasp.paths import BENCHMARKS
-
-THICKNESS = BENCHMARKS / "results" / "thickness" / "thickness.json"
-"""Results of `benchmarks/thickness.py` in a checkout."""
 
 Traced = Mapping[Cell, Sequence[tuple[Mapping[str, Any], Trace]]]
 """Lines that have a trace, with it, by cell and in the order of the episodes."""
@@ -113,45 +106,25 @@ def motion_pictures(runs: Runs, traced: Traced) -> list[Block]:
     return blocks
 
 
-def thickness_blocks(file: Path = THICKNESS) -> list[Block]:
-    """The thickness curve, where the study's results are at hand."""
-    try:
-        cells = json.loads(file.read_text(encoding="utf-8"))["cells"]
-        seen = [cell for cell in cells if cell["thickness_mm"]]
-        thinnest = min(cell["thickness_mm"] for cell in seen)
-        said = "; ".join(
-            f"{c['detector']} at {c['tcp_height_m']:g} m {100 * c['detected']['rate']:.0f} %"
-            for c in seen if c["thickness_mm"] == thinnest
-        )  # fmt: skip
-        alt = f"Detection rate against the thickness of a stick. At {thinnest:g} mm: {said}."
-        markup = thickness_picture(seen, alt)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        text = f"No results of `benchmarks/thickness.py` at hand ({type(error).__name__})."
-        return [Paragraph(text=text)]
-    caption = "how thin a stick is still detected, by height of the tool point; 95 % Wilson intervals"
-    return [
-        Paragraph(
-            text="A study of its own, not part of these runs: `python benchmarks/thickness.py` "
-            "measures single frames."
-        ),
-        Picture(caption=caption, alt=alt, markup=markup),
-    ]
-
-
 def film_blocks(runs: Runs, traced: Traced) -> list[Block]:
     """A strip of stills of the first success and of the first failure of each cell."""
     blocks: list[Block] = []
+    never, lost = [], []
     for cell, lines in runs.cells.items():
         name = f"{cell[0]}: {name_of(*cell[1:])}"
         for success, word in ((True, "success"), (False, "failure")):
             played = [ln for ln in lines if ln.get("outcome") != ERROR and bool(ln.get("success")) is success]
             found = [(ln, t) for ln, t in traced[cell] if bool(ln["success"]) is success and t.stills]
             if not played:
-                blocks.append(Paragraph(text=f"{name}: no {word} to show."))
+                never.append(f"{name}, {word}")
             elif not found:
-                blocks.append(_no_traces(f"{name}: stills of a {word}"))
+                lost.append(f"{name}, {word}")
             else:
                 blocks.append(_strip(name, word, *found[0]))
+    if lost:
+        blocks.append(_no_traces(f"stills of {'; '.join(lost)}"))
+    if never:
+        blocks.append(Paragraph(text=f"No episode to show: {'; '.join(never)}."))
     return blocks
 
 

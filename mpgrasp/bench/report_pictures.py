@@ -12,6 +12,7 @@ import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +31,10 @@ GOOD, BAD, OTHER = "#2a7fce", "#d9622b", "#8a8f98"
 INK = "#010203"
 """Stands for the page's ink until the SVG is written."""
 
+Curves = Mapping[str, Sequence[tuple[float, float, float, float]]]
+"""(x, rate, low, high) of each point, by the line's label."""
+
+_LABEL = 24  # characters of a row's name in a line
 _STYLE = {
     "font.size": 9.5,
     "font.family": "DejaVu Sans",
@@ -120,7 +125,8 @@ def time_picture(times: Mapping[str, tuple[Sequence[float], Sequence[float]]], a
                     )
         _rows(axes, list(times))
         axes.set(xlabel="simulated time [s]")
-        axes.set_xlim(left=0)
+        longest = max(time_s for pair in times.values() for values in pair for time_s in values)
+        axes.set_xlim(0, 1.05 * longest or 1.0)  # with room for the last tick's label
         _legend_above(figure)
 
     return _svg(draw, 1.0 + 0.42 * len(times), alt)
@@ -197,40 +203,34 @@ def way_picture(
     return _svg(draw, 2.9 if len(examples) > 1 else 3.9, alt)
 
 
-def thickness_picture(cells: Sequence[Mapping[str, Any]], alt: str) -> str:
-    """Detection rates of `benchmarks/thickness.py` against thickness, a panel per detector."""
+def thickness_picture(panels: Mapping[str, Curves], what: str, alt: str) -> str:
+    """Rates against thickness [mm], a panel per title, the lines of one beside each other.
+
+    Args:
+        panels: curves by title.
+        what: label of the rates [%].
+        alt: description.
+    """
 
     def draw(figure: Figure) -> None:
-        detectors, heights = (list(dict.fromkeys(c[k] for c in cells)) for k in ("detector", "tcp_height_m"))
-        panels = figure.subplots(len(detectors), 1, sharex=True, squeeze=False)[:, 0]
-        shades = np.linspace(0.15, 0.85, len(heights))
-        for axes, name in zip(panels, detectors, strict=True):
-            for height, marker, shade in zip(heights, "osD^v<>*" * 9, shades, strict=False):
-                row = [
-                    c for c in cells
-                    if (c["detector"], c["tcp_height_m"]) == (name, height) and c["thickness_mm"]
-                ]  # fmt: skip
-                rate, low, high = (
-                    100 * np.array([c["detected"][k] for c in row])
-                    for k in ("rate", "wilson_low", "wilson_high")
-                )
+        for axes, (title, curves) in zip(
+            figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0], panels.items(), strict=True
+        ):
+            shades = np.linspace(0, 1, len(curves)).tolist()
+            for k, (label, points) in enumerate(curves.items()):
+                thickness, *rates = np.array(points, float).T
+                rate, low, high = (100 * values for values in rates)
                 axes.errorbar(
-                    [c["thickness_mm"] for c in row],
-                    rate,
-                    yerr=np.maximum([rate - low, high - rate], 0),
-                    marker=marker,
-                    ms=4,
-                    lw=1,
-                    capsize=2,
-                    color=_mix(GOOD, BAD, float(shade)),
-                    label=f"tool at {height:g} m",
-                )
-            axes.set_title(name, fontsize=9.5, loc="left")
-            axes.set(ylim=(-2, 102), ylabel="detected [%]")
-        panels[-1].set_xlabel("thickness [mm]")
+                    thickness + 0.12 * (k - (len(curves) - 1) / 2), rate,
+                    yerr=np.maximum([rate - low, high - rate], 0), marker="osD^v<>"[k % 7], ms=4, lw=1,
+                    capsize=2, color=_mix(GOOD, BAD, shades[k]), label=label,
+                )  # fmt: skip
+            axes.set_title(title, fontsize=9.5, loc="left")
+            axes.set(ylim=(-2, 102), ylabel=what)
+        axes.set_xlabel("thickness [mm]")
         _legend_above(figure, columns=2)
 
-    return _svg(draw, 1.0 + 1.7 * len({c["detector"] for c in cells}), alt)
+    return _svg(draw, 1.2 + 1.7 * len(panels), alt)
 
 
 def data_uri(picture: bytes, kind: str = "webp") -> str:
@@ -247,8 +247,10 @@ def _interval(
 
 
 def _rows(axes: Axes, labels: Sequence[str]) -> None:
-    """One row per label, the first on top."""
-    axes.set_yticks(range(len(labels)), labels)
+    """One row per label, the first on top; long names are folded, to leave room for what is drawn."""
+    axes.set_yticks(range(len(labels)), ["\n".join(wrap(label, _LABEL)) for label in labels])
+    for text in axes.get_yticklabels():
+        text.set_fontsize(7.5 if "\n" in text.get_text() else 9.5)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.grid(axis="y", visible=False)
 
@@ -259,7 +261,8 @@ def _legend_above(figure: Figure, columns: int = 3) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
     if found:
-        figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)
+        ncols = columns if max(map(len, found)) < 30 else 1
+        figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=ncols)
 
 
 def _mix(a: str, b: str, share: float) -> tuple[float, ...]:

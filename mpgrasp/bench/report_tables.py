@@ -6,16 +6,19 @@ import json
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from mpgrasp.bench.document import Block, Folded, Listing, Paragraph, Table
 from mpgrasp.bench.paper_tables import Rows, rate_text, time_text
 from mpgrasp.bench.player import ERROR
 from mpgrasp.bench.run_reading import Run, Runs, name_of
-from mpgrasp.plain import difference
+from mpgrasp.plain import Difference, difference
 
 CARD = ("physics", "camera", "motion", "ik", "reflex")
 """Keys of run.json that make up the physics card."""
+STAGES = ("render", "detect", "control", "ik", "physics")
+"""What a control tick is made of, as in a line's `timing`."""
 _MOTION = (
     ("min_singular_value", "smallest singular value, median"),
     ("near_singularity_s", "near a singularity [s]"),
@@ -103,6 +106,43 @@ def motion_table(rows: Rows) -> Table:
     )
 
 
+def timing_blocks(runs: Runs) -> list[Block]:
+    """Where the wall-clock of a control tick goes, by cell, and the share of all but network inference."""
+    rows, detect_ms, whole_ms = [], 0.0, 0.0
+    for cell, lines in runs.cells.items():
+        timed = [line["timing"] for line in lines if all(key in (line.get("timing") or ()) for key in STAGES)]
+        if not timed:
+            continue
+        means = {stage: fmean(timing[stage] for timing in timed) for stage in STAGES}
+        tick = sum(means.values())
+        network = not runs.owners[cell].reads_truth(cell[1])
+        if network:
+            detect_ms, whole_ms = detect_ms + len(timed) * means["detect"], whole_ms + len(timed) * tick
+        share = _share(means["detect"], tick) if network else "no network"
+        values = (f"{means[stage]:.1f}" for stage in STAGES)
+        rows.append((cell[0], name_of(*cell[1:]), str(len(timed)), f"{tick:.1f}", *values, share))
+    if not rows:
+        return [Paragraph(text="Not known: the lines of these runs hold no times of all stages.")]
+    blocks: list[Block] = [
+        Table(
+            caption="Wall-clock of a control tick [ms]",
+            headings=("suite", "cell", "n", "tick", *STAGES, "network inference"),
+            rows=rows,
+            note="Means over n episodes of the median of each stage of a tick of the reach; building scenes, "
+            "grasping and lifting are not in it. Network inference is `detect`: the network with what "
+            "prepares its image and smooths its maps.",
+        )
+    ]
+    if whole_ms:
+        said = f"everything apart from network inference: {_share(whole_ms - detect_ms, whole_ms)}"
+        blocks.append(Paragraph(text=f"Of a control tick, over all cells with a network, {said}."))
+    return blocks
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{100 * part / whole:.1f} %" if whole else "-"
+
+
 def failure_blocks(runs: Runs) -> list[Block]:
     """Every failure and every error row, with the command that plays it again."""
     rows = [
@@ -159,10 +199,7 @@ def run_blocks(runs: Runs) -> list[Block]:
         for key in ("seed", "camera", "noise", "episode"):
             found = difference(first.configuration.get(key), run.configuration.get(key), key)
             if found:
-                text = found.replace(" there", f" in `{first.folder}`").replace(
-                    " here", f" in `{run.folder}`"
-                )
-                blocks.append(Paragraph(text=f"Not the same in all runs: {text}"))
+                blocks.append(_not_the_same(found, first, run))
     return blocks
 
 
@@ -184,12 +221,14 @@ def card_blocks(runs: Runs) -> list[Block]:
         for key in CARD:
             found = difference(first.about.get(key), run.about.get(key), key)
             if found:
-                text = found.replace(" there", f" in `{first.folder}`").replace(
-                    " here", f" in `{run.folder}`"
-                )
-                blocks.append(Paragraph(text=f"Not the same in all runs: {text}"))
+                blocks.append(_not_the_same(found, first, run))
                 break
     return [Folded(summary="Physics, contacts, camera, motion and protective limits", blocks=blocks)]
+
+
+def _not_the_same(found: Difference, first: Run, run: Run) -> Paragraph:
+    said = found.words(f"in `{first.folder}`", f"in `{run.folder}`")
+    return Paragraph(text=f"Not the same in all runs: {said}")
 
 
 def _contact_table(geoms: Mapping[str, Any]) -> Table:

@@ -21,12 +21,13 @@ from mpgrasp.bench.runner import Crew, make_crew
 from mpgrasp.bench.suite import Suite
 from mpgrasp.bench.summary import paired_tests, summarise
 from mpgrasp.bench.trace import prune_traces
+from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
 from mpgrasp.exceptions import ConfigError, OutputError
 
 if TYPE_CHECKING:
     from mpgrasp.bench.object_check import Verdict
 
-EXIT_BROKEN, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_BROKEN = 1
 DETECTOR, CONTROLLER = "dhrnet", "mppc"
 """Who plays a suite unless told otherwise."""
 
@@ -119,7 +120,8 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         if arguments.resume:
             directory = RunDirectory.resume(out, content, progress.note)
         else:
-            directory = RunDirectory.create(out, content)
+            planned = len(plan.tasks()) if plan.until_ci is None else None
+            directory = RunDirectory.create(out, content, planned)
         # where there are workers, each has detectors of its own: these here would only take up memory
         here = None if arguments.workers else player
         del player
@@ -195,23 +197,16 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
     from mpgrasp.bench.html_report import write_report
 
     code = 0
-    lines = directory.episodes()
-    last = {
-        suite.name: max((line["episode"] for line in lines if line["suite"] == suite.name), default=-1)
-        for suite in plan.suites
-    }
-    order = [task for suite in plan.suites for task in plan.tasks_of(suite, 0, 1 + last[suite.name])]
-    rank = {key: k for k, key in enumerate(order)}
-    lines.sort(key=lambda line: rank.get(Task.of(line), len(rank)))
+    lines = sorted(directory.episodes(), key=lambda line: plan.place(Task.of(line)))
     cells, tests = summarise(lines), paired_tests(lines)
     errors = sum(cell["errors"] for cell in cells)
     try:
-        directory.settle(order)
+        directory.settle(lines)
         directory.write_summary({"complete": finished and not errors, "cells": cells, "paired_tests": tests})
         prune_traces(directory.path / "traces")
         write_report([directory.path], directory.path)
     except OutputError as error:
-        print(f"mpgrasp: error: {error}", file=sys.stderr)
+        print_error(error)
         code = EXIT_BAD_INPUT
     finally:
         directory.close()

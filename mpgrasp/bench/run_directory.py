@@ -17,9 +17,10 @@ from typing import Any
 
 from mpgrasp.bench.plan import Task
 from mpgrasp.bench.player import ERROR, Line
-from mpgrasp.bench.run_files import EPISODES, RUN, read_lines, read_run
+from mpgrasp.bench.run_files import EPISODES, RUN, SUMMARY, read_complete, read_lines, read_run
 from mpgrasp.exceptions import OutputError
 from mpgrasp.plain import difference, one_line, plain
+from mpgrasp.replace_file import replace_file
 
 
 class RunDirectory:
@@ -32,18 +33,21 @@ class RunDirectory:
         self._episodes: int | None = None
 
     @classmethod
-    def create(cls, path: Path, run: Mapping[str, Any]) -> RunDirectory:
+    def create(cls, path: Path, run: Mapping[str, Any], planned: int | None = None) -> RunDirectory:
         """A folder for a new run, with its run.json.
 
-        A folder that holds a run with the same `configuration` is taken over: its episodes.jsonl is
-        kept as episodes.previous.jsonl, in place of one that may be there.
+        A folder that holds a complete run with the same `configuration` is taken over: its
+        episodes.jsonl is kept as episodes.previous.jsonl, the next as episodes.previous-2.jsonl, ...
 
         Args:
             path: the folder; it is made if need be.
             run: content of run.json; its `configuration` says what is being run.
+            planned: number of episodes that such a run has when it is complete; None if it depends on
+                their results.
 
         Raises:
-            OutputError: a folder that cannot be written, or that holds another run.
+            OutputError: a folder that cannot be written, or that holds another run, or one that is not
+                complete.
         """
         new = cls(path)
         content = plain(run)
@@ -51,10 +55,10 @@ class RunDirectory:
             path.mkdir(parents=True, exist_ok=True)
             new._claim()
             new._refuse_other_run(content["configuration"])
+            new._refuse_unfinished_run(planned)
             new._write(RUN, content)
-            if new.episodes_file.exists():
-                os.replace(new.episodes_file, path / "episodes.previous.jsonl")
-            (path / "summary.json").unlink(missing_ok=True)
+            new._keep_old_lines()
+            (path / SUMMARY).unlink(missing_ok=True)
             new._open()
         return new
 
@@ -79,14 +83,14 @@ class RunDirectory:
         found = difference(before["configuration"], content["configuration"])
         if found:
             raise OutputError(
-                f"cannot resume with another configuration ({found})",
+                f"cannot resume with another configuration ({found.words('there', 'here')})",
                 got=str(path),
                 allowed="the configuration that the run began with, or another directory",
             )
         entry: dict[str, Any] = {"started": content.get("started")}
         changed = difference(before.get("made_with"), content.get("made_with"))
         if changed:
-            note(f"not made with the same as the finished episodes ({changed})")
+            note(f"not made with the same as the finished episodes ({changed.words('there', 'here')})")
             entry["made_with"] = content["made_with"]
         with new._taking_over():
             new._claim()
@@ -136,7 +140,7 @@ class RunDirectory:
         """One line per episode so far, in the order of the file; a result counts more than an error.
 
         Raises:
-            OutputError: a line that is not JSON.
+            OutputError: a line that is not one of an episode.
         """
         lines: dict[Task, Line] = {}
         for line in read_lines(self.path).lines:
@@ -145,21 +149,17 @@ class RunDirectory:
                 lines[key] = line
         return list(lines.values())
 
-    def settle(self, order: Iterable[Task]) -> list[Line]:
-        """Put the lines into an order, one per episode, and return them; those left over come last.
+    def settle(self, lines: Iterable[Line]) -> None:
+        """Write all lines anew, in their final order; nothing can be appended any more.
 
         Raises:
             OutputError: the file cannot be written anew; the old one stays as it is.
         """
-        rank = {key: k for k, key in enumerate(order)}
-        lines = self.episodes()
-        lines.sort(key=lambda line: rank.get(Task.of(line), len(rank)))
         try:
-            self._replace(EPISODES, "".join(one_line(line) for line in lines))
+            replace_file(self.episodes_file, "".join(one_line(line) for line in lines))
         except OSError as error:
             raise _not_writable(self.episodes_file, error) from error
         self._close_episodes()  # it is the old file's
-        return lines
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write summary.json.
@@ -168,9 +168,9 @@ class RunDirectory:
             OutputError: the file cannot be written.
         """
         try:
-            self._write("summary.json", plain(summary))
+            self._write(SUMMARY, plain(summary))
         except OSError as error:
-            raise _not_writable(self.path / "summary.json", error) from error
+            raise _not_writable(self.path / SUMMARY, error) from error
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -226,7 +226,8 @@ class RunDirectory:
     def _refuse_other_run(self, configuration: Any) -> None:
         if (self.path / RUN).exists():
             try:
-                found = difference(read_run(self.path)["configuration"], configuration)
+                differs = difference(read_run(self.path)["configuration"], configuration)
+                found = differs and differs.words("there", "here")
             except OutputError:
                 found = "its run.json cannot be read"
         elif self.episodes_file.exists():
@@ -240,22 +241,32 @@ class RunDirectory:
                 allowed="a new directory, or the same configuration again",
             )
 
-    def _write(self, name: str, content: Any) -> None:
-        self._replace(name, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    def _refuse_unfinished_run(self, planned: int | None) -> None:
+        """A run that has cost hours is not begun anew because its command was given twice."""
+        if read_complete(self.path) or not self.episodes_file.exists():
+            return
+        lines = self.episodes()
+        if lines:
+            played = sum(line["outcome"] != ERROR for line in lines)
+            raise OutputError(
+                f"directory already holds this run, unfinished ({played} "
+                f"{'' if planned is None else f'of {planned} '}episodes are there)",
+                got=str(self.path),
+                allowed=f"--resume {self.path}, or another --out",
+            )
 
-    def _replace(self, name: str, text: str) -> None:
-        """Replace a file as a whole, so that there is never half of one."""
-        temporary = self.path / f".{name}.tmp"
-        try:
-            with temporary.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self.path / name)
-        except OSError:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise
+    def _keep_old_lines(self) -> None:
+        """Put episodes.jsonl aside, if there is anything in it, under a name that is free."""
+        if not (self.episodes_file.exists() and self.episodes_file.stat().st_size):
+            return
+        number, aside = 1, self.path / "episodes.previous.jsonl"
+        while aside.exists():
+            number += 1
+            aside = self.path / f"episodes.previous-{number}.jsonl"
+        os.replace(self.episodes_file, aside)
+
+    def _write(self, name: str, content: Any) -> None:
+        replace_file(self.path / name, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
 
 def _not_writable(path: Path, error: OSError) -> OutputError:

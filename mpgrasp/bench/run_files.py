@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.plan import Task
+from mpgrasp.bench.player import ERROR
 from mpgrasp.exceptions import OutputError
 
-RUN, EPISODES = "run.json", "episodes.jsonl"
+RUN, EPISODES, SUMMARY = "run.json", "episodes.jsonl", "summary.json"
+
+ALWAYS = (*Task._fields, "seed", "scene_seed", "outcome", "success")
+"""Keys of every line."""
+PLAYED = ("object", "sim_time_s", "reflex", "state_hash")
+"""Keys that the line of an episode has besides, unless it could not be played."""
+CLEARING = ("failures", "in_basket", "knocked_off", "left")
+"""Keys that a line with `picks` has besides."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +53,20 @@ def read_run(path: Path) -> dict[str, Any]:
     return run
 
 
+def read_complete(path: Path) -> bool | None:
+    """Whether summary.json says that a run is complete; None where it is not there or says nothing."""
+    try:
+        return bool(json.loads((path / SUMMARY).read_text(encoding="utf-8"))["complete"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def read_lines(path: Path) -> Lines:
     """Lines of episodes.jsonl; a last one that a full disk or a kill cut short is set apart.
 
     Raises:
-        OutputError: the file cannot be read, or a line before the last is not one of an episode.
+        OutputError: the file cannot be read, a line before the last is not one of an episode, or one
+            lacks a key that all such lines have.
     """
     file = path / EPISODES
     try:
@@ -68,16 +86,29 @@ def read_lines(path: Path) -> Lines:
             )
         if line is None:
             return Lines(lines=lines, whole=whole, torn=text)
+        if missing := _missing(line):
+            raise OutputError(
+                f"{file}, line {number} is not an episode's: it lacks {', '.join(missing)}",
+                got=text[:60].decode(errors="replace"),
+                allowed="lines as mpgrasp.bench writes them",
+            )
         lines.append(line)
         whole += len(text)
     return Lines(lines=lines, whole=whole, torn=None)
 
 
 def _parse(text: bytes) -> dict[str, Any] | None:
-    """An episode's line; None for anything else, and for one without its end."""
+    """A line that holds an object; None for anything else, and for one without its end."""
     try:
         line = json.loads(text)
     except ValueError:
         return None
-    whole = isinstance(line, dict) and text.endswith(b"\n") and set(Task._fields) <= set(line)
-    return line if whole else None
+    return line if isinstance(line, dict) and text.endswith(b"\n") else None
+
+
+def _missing(line: Mapping[str, Any]) -> list[str]:
+    """Keys that a line should have and has not."""
+    needed = [*ALWAYS, *(("error",) if line.get("outcome") == ERROR else PLAYED)]
+    if "picks" in line:
+        needed += CLEARING
+    return [key for key in needed if key not in line]

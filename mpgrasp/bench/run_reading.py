@@ -53,6 +53,11 @@ class Run:
         task = Task(**which)
         return read_trace(self.folder / "traces", task.stem, line)
 
+    def reads_truth(self, detector: str) -> bool:
+        """Whether a detector is shown the truth and needs no network."""
+        known = self.configuration.get("detectors") or ()
+        return any(item.get("name") == detector and item.get("reads_truth") for item in known)
+
     def map_extent(self, controller: str) -> tuple[float, float, float, float] | None:
         """Bounds in x, then in y [m] of a controller's entropy map; None where it is not known."""
         try:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from mpgrasp.bench.plan import Plan, Task
 from mpgrasp.bench.player import EpisodeError, Games, Line, Player, error_line, real_games
-from mpgrasp.bench.workers import HANG_AFTER, WorkerPool
+from mpgrasp.bench.workers import WorkerPool
 from mpgrasp.exceptions import ConfigError
 
 ATTEMPTS = 2
@@ -50,7 +50,7 @@ def make_crew(
     *,
     run_episode: Games | None = None,
     player: Player | None = None,
-    hang_after: float = HANG_AFTER,
+    hang_after: float | None = None,
 ) -> Crew:
     """Who plays a plan.
 
@@ -61,11 +61,12 @@ def make_crew(
         run_episode: plays one episode; `mpgrasp.episode.run_episode` if not given. It reaches the
             workers by its import path.
         player: to use in this process, if there is one already.
-        hang_after: wall-clock time that an episode may take before its worker is killed [s].
+        hang_after: wall-clock time that an episode may take before its worker is killed [s]; None for
+            that of its trial (`workers.HANG_AFTER`).
     """
     if workers < 0:
         raise ConfigError("workers out of range", got=workers, allowed="0 or more")
-    if not hang_after > 0:
+    if hang_after is not None and not hang_after > 0:
         raise ConfigError("hang-after out of range", got=hang_after, allowed="more than 0 s")
     run_episode = run_episode or real_games()
     if workers:
@@ -79,7 +80,7 @@ def play_all(
     *,
     workers: int = 0,
     run_episode: Games | None = None,
-    hang_after: float = HANG_AFTER,
+    hang_after: float | None = None,
     note: Note = lambda _: None,
 ) -> None:
     """Play a plan's first batch with a crew of its own; see `make_crew` and `Crew.play`."""

@@ -31,6 +31,10 @@ TRIALS = ("grasp", "clear")
 """What an episode can be: one grasp, or a table to be cleared."""
 BOX_DENSITY = 1000.0
 """Of a box that is declared by its size [kg/m3]."""
+_ACCEPTED: Mapping[str, tuple[type, ...]] = {
+    "bool": (bool,), "int": (int,), "float": (int, float), "str": (str,)
+}  # fmt: skip
+"""Types of value that a setting takes, by its annotation; configs check the others themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +58,7 @@ class Suite:
             raise ConfigError(f"{where} has no scene", allowed="one scene or more")
         if self.trial not in TRIALS:
             raise ConfigError(f"{where}: unknown trial", got=self.trial, allowed=TRIALS)
-        if not isinstance(self.trials, int) or self.trials < 1:
+        if type(self.trials) is not int or self.trials < 1:  # true is an int to isinstance
             raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed="1 or more")
         if self.trial == "clear" and not all(scene.basket for scene in self.scenes):
             raise ConfigError(f"{where}: clearing needs a basket", got="basket = false", allowed="true")
@@ -153,11 +157,30 @@ def episode_seed(suite: str, seed: int, episode: int) -> int:
 
 def _construct(kind: Any, settings: Mapping[str, Any], where: str) -> Any:
     """An instance of a config dataclass from declared settings, with errors that name the place."""
-    _refuse_unknown(settings, [f.name for f in dataclasses.fields(kind)], where)
+    fields = {f.name: f for f in dataclasses.fields(kind)}
+    _refuse_unknown(settings, fields, where)
+    values = {key: _value(fields[key], value, f"{where}, {key}") for key, value in settings.items()}
     try:
-        return kind(**_as_tuples(settings))
+        return kind(**values)
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{where}: {error}") from error
+
+
+def _value(declared: dataclasses.Field[Any], value: Any, where: str) -> Any:
+    """What a setting is declared to be; of a config within the config, only what departs from its default."""
+    make = declared.default_factory
+    default: Any = declared.default if make is dataclasses.MISSING else make()
+    nested = dataclasses.is_dataclass(default) and not isinstance(default, type)
+    if isinstance(value, Mapping) is not nested:
+        allowed = [f.name for f in dataclasses.fields(default)] if nested else f"a value such as {default!r}"
+        raise ConfigError(f"{where} is {'not ' if nested else ''}a table", got=value, allowed=allowed)
+    accepted = _ACCEPTED.get(str(declared.type).removesuffix(" | None"))
+    if accepted and value is not None and type(value) not in accepted:  # true is an int to isinstance
+        raise ConfigError(f"{where} is unusable", got=value, allowed=f"a value such as {default!r}")
+    if not nested:
+        return _as_tuples(value)
+    rest = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}
+    return _construct(type(default), {**rest, **value}, where)
 
 
 def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:

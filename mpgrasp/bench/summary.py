@@ -68,6 +68,17 @@ def time_of(line: Mapping[str, Any]) -> float:
     return float(line["time_limit_s"] if unfinished else line["sim_time_s"])
 
 
+def restricted_time(line: Mapping[str, Any], limit: float | None = None) -> float:
+    """Simulated time of an episode cut off at its limit, or else at `limit` [s].
+
+    Who has not got to the end took at least as long as is allowed.
+    """
+    time, allowed = float(line["sim_time_s"]), line.get("time_limit_s", limit)
+    if allowed is None:
+        return time
+    return min(time, float(allowed)) if line["success"] else float(allowed)
+
+
 def _cell(
     suite: str, detector: str, controller: str, lines: list[Mapping[str, Any]], limit: float | None
 ) -> dict[str, Any]:
@@ -136,7 +147,7 @@ def paired_tests(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """One JSON-ready row per two cells of a suite over the worlds that both met.
 
     Keys: suite, a and b as [detector, controller], n, both, a_alone, b_alone, p (McNemar, exact,
-    two-sided) and p_holm, corrected over all rows.
+    two-sided) and p_holm, corrected over all rows of the suite.
     """
     rows: list[dict[str, Any]] = []
     for (key_a, lines_a), (key_b, lines_b) in combinations(by_cell(episodes).items(), 2):
@@ -147,6 +158,8 @@ def paired_tests(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
             {"suite": key_a[0], "a": list(key_a[1:]), "b": list(key_b[1:]), "n": found.n}
             | {name: getattr(found, name) for name in ("both", "a_alone", "b_alone", "p")}
         )
-    for row, p in zip(rows, holm([row["p"] for row in rows]), strict=True):
-        row["p_holm"] = p
+    for suite in {row["suite"] for row in rows}:
+        family = [row for row in rows if row["suite"] == suite]
+        for row, p in zip(family, holm([row["p"] for row in family]), strict=True):
+            row["p_holm"] = p
     return rows

@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections import defaultdict, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -26,12 +26,17 @@ from mpgrasp.bench.plan import Plan, Task
 from mpgrasp.bench.player import EpisodeError, Games, Line, Player, error_line
 from mpgrasp.exceptions import MpgraspError
 
-HANG_AFTER = 600.0
-"""Wall-clock time that one episode may take [s]; a usual one takes 5 to 10 s."""
+HANG_AFTER: Mapping[str, float] = {"grasp": 600.0, "clear": 3600.0}
+"""Wall-clock time that an episode may take unless told otherwise, by trial [s].
+
+A usual grasp takes 5 to 10 s; a table may take 60 times as long to clear (`ClearingConfig.time_limit`).
+"""
 START_LIMIT = 300.0
 """Wall-clock time that a worker may take to import, load weights and compile networks [s]."""
 GRACE = 1.0
 """Time between the dump of a hanging worker's stack and its end [s]."""
+END_LIMIT = 10.0
+"""Wall-clock time that a process may take to end once its pipe has ended [s]; usually next to none."""
 FAILED_STARTS = 3
 """Workers in a row that may die while they start before the run gives up."""
 
@@ -42,7 +47,7 @@ class WorkerPool:
     """Plays tasks in processes; implements `runner.Crew`."""
 
     def __init__(
-        self, plan: Plan, size: int, run_episode: Games, *, hang_after: float, attempts: int
+        self, plan: Plan, size: int, run_episode: Games, *, hang_after: float | None, attempts: int
     ) -> None:
         self._plan, self._size, self._run_episode = plan, size, run_episode
         self._hang_after, self._attempts = hang_after, attempts
@@ -91,11 +96,16 @@ class WorkerPool:
 
     def _hand_out(self, todo: deque[Task]) -> None:
         while len(self._workers) < min(self._size, len(todo) + len(self._busy())):
-            self._workers.append(_Worker(self._plan, self._run_episode, self._hang_after))
+            self._workers.append(_Worker(self._plan, self._run_episode))
         for worker in self._workers:
             # one that died idle refuses, and is found out by the next wait
-            if todo and worker.ready and worker.task is None and worker.give(todo[0]):
+            if todo and worker.ready and worker.task is None and worker.give(todo[0], self._limit(todo[0])):
                 todo.popleft()
+
+    def _limit(self, task: Task) -> float:
+        """Wall-clock time that an episode may take [s]."""
+        trial = self._plan.suite(task.suite).trial
+        return HANG_AFTER[trial] if self._hang_after is None else self._hang_after
 
     def _wait(self) -> list[_Worker]:
         """Workers that have something to say or have had their time."""
@@ -122,28 +132,26 @@ class WorkerPool:
 class _Worker:
     """The run's end of one worker process."""
 
-    def __init__(self, plan: Plan, run_episode: Games, hang_after: float) -> None:
+    def __init__(self, plan: Plan, run_episode: Games) -> None:
         self.connection, theirs = _context.Pipe()
         self._log, name = tempfile.mkstemp(prefix="mpgrasp-worker-", suffix=".log")
         self._log_name = Path(name)
-        self._process = _context.Process(
-            target=_work, args=(theirs, plan, run_episode, name, hang_after), daemon=True
-        )
+        self._process = _context.Process(target=_work, args=(theirs, plan, run_episode, name), daemon=True)
         self._process.start()
         theirs.close()  # or the end of the worker would not be the end of the pipe
-        self._hang_after = hang_after
+        self._limit = START_LIMIT
         self._trace = ""
         self.ready = False
         self.task: Task | None = None
-        self.deadline = time.monotonic() + START_LIMIT + GRACE
+        self.deadline = time.monotonic() + self._limit + GRACE
 
-    def give(self, task: Task) -> bool:
-        """Hand over a task; False where nobody is there to take it."""
+    def give(self, task: Task, limit: float) -> bool:
+        """Hand over a task that may take `limit` seconds; False where nobody is there to take it."""
         try:
-            self.connection.send(task)
+            self.connection.send((task, limit))
         except OSError:
             return False
-        self.task, self.deadline = task, time.monotonic() + self._hang_after + GRACE
+        self.task, self._limit, self.deadline = task, limit, time.monotonic() + limit + GRACE
         return True
 
     def answer(self) -> tuple[str, Any]:
@@ -153,11 +161,10 @@ class _Worker:
             try:
                 answer: tuple[str, Any] = self.connection.recv()
             except (EOFError, OSError):
-                self._process.join()
+                self._process.join(END_LIMIT)  # it may go on without its pipe: whoever is told ends it
                 return "dead", f"crashed: its process {_cause(self._process.exitcode)}"
             return answer
-        limit = self._hang_after if self.ready else START_LIMIT
-        return "dead", f"hung: no answer within {limit:g} s"
+        return "dead", f"hung: no answer within {self._limit:g} s"
 
     def trace(self) -> str:
         """The Python stack of a crash or a hang, once the process has ended."""
@@ -174,14 +181,16 @@ class _Worker:
 
 
 def _cause(exitcode: int | None) -> str:
-    if exitcode is None or exitcode >= 0:
+    if exitcode is None:
+        return "closed its pipe and went on"
+    if exitcode >= 0:
         return f"ended with exit code {exitcode}"
     with suppress(ValueError):
         return f"was killed by {signal.Signals(-exitcode).name}"
     return f"was killed by signal {-exitcode}"
 
 
-def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str, hang_after: float) -> None:
+def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str) -> None:
     """What a worker process does until the pipe ends."""
     # Ctrl-C reaches the whole process group; the parent decides what becomes of its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -196,8 +205,8 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str,
             connection.send(("ready", None))
             while True:
                 faulthandler.cancel_dump_traceback_later()
-                task = connection.recv()
-                faulthandler.dump_traceback_later(hang_after, file=log)
+                task, limit = connection.recv()
+                faulthandler.dump_traceback_later(limit, file=log)
                 try:
                     connection.send(("line", player.play(task)))
                 except EpisodeError as error:

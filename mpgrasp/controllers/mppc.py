@@ -45,6 +45,8 @@ def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridM
     """
     if (cells < 0).all():
         return None
-    quality = grasp_map.quality - grid.failures.ravel()[cells]
+    quality = grasp_map.quality
+    if grid.failures.any():
+        quality = quality - grid.failures.ravel()[cells]
     row, col = best_pixel(np.where(cells >= 0, quality, -np.inf))
     return replace(grasp_map.grasp_at(row, col), quality=float(np.clip(quality[row, col], 0.0, 1.0)))

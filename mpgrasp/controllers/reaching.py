@@ -133,5 +133,6 @@ class ReachingController(ABC):
 
 def peak_height(quality: FloatArray) -> float:
     """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
-    finite = np.nan_to_num(quality).astype(np.float32)
-    return float(cv2.blur(finite, (3, 3), borderType=cv2.BORDER_REPLICATE).max())
+    finite = quality if np.isfinite(quality).all() else np.nan_to_num(quality)
+    image = finite.astype(np.float32, copy=False)
+    return float(cv2.blur(image, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import NoReturn
 
+from mpgrasp.command_line import Parser
 from mpgrasp.detectors import RUNTIMES
-from mpgrasp.exceptions import ConfigError
 
 _RUNTIMES = "|".join(RUNTIMES)
 _EPILOG = """\
@@ -27,7 +26,7 @@ exit code: 0 done, 1 the runtime finds other grasps (check), 2 unusable input, 1
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
-    parser = _Parser(
+    parser = Parser(
         prog="python -m mpgrasp.detectors",
         description="See what grasp detectors see, how exact they are, and what is known of their weights.",
         epilog=_EPILOG,
@@ -71,11 +70,6 @@ def make_parser() -> argparse.ArgumentParser:
     about.add_argument("detector", metavar="NAME", help="whose weights they are")
     about.add_argument("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")
     return parser
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(message, allowed=f"see {self.prog} --help")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ import json
 import logging
 import os
 import sys
-import tempfile
 import warnings
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +27,7 @@ from torch import nn
 
 from mpgrasp import paths
 from mpgrasp.detectors.weights import NetworkWeights
+from mpgrasp.replace_file import replace_file
 
 Float32 = NDArray[np.float32]
 
@@ -178,14 +178,7 @@ def _write(file: Path | None, blob: bytes) -> None:
         return
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=file.parent)
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(hashlib.sha256(blob).digest() + blob)
-            os.replace(temporary, file)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        replace_file(file, hashlib.sha256(blob).digest() + blob)
         kept = sorted(file.parent.glob("*.ov"), key=lambda f: f.stat().st_mtime, reverse=True)
         for old in kept[KEPT:]:
             old.unlink(missing_ok=True)

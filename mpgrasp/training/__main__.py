@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
-from mpgrasp.exceptions import MpgraspError
+from mpgrasp.command_line import Parser, run_command
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; returns the exit code, 2 for input that cannot be used."""
+    return run_command(lambda: _run(argv))
+
+
+def _run(argv: Sequence[str] | None) -> int:
     from mpgrasp.training import generate, train
 
-    parser = _Parser(prog="python -m mpgrasp.training", description=__doc__)
+    parser = Parser(prog="python -m mpgrasp.training", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="generate|train")
     helps = (("generate", generate, "make a data set"), ("train", train, "train a network on one"))
     for name, module, text in helps:
@@ -22,20 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         module.add_arguments(command)
         command.set_defaults(run=module.main)
     args = parser.parse_args(argv)
-    try:
-        return int(args.run(args) or 0)
-    except MpgraspError as error:
-        print(f"mpgrasp.training: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"mpgrasp.training: {message}; see {self.prog} --help\n")
+    return int(args.run(args))
 
 
 if __name__ == "__main__":

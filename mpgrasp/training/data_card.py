@@ -22,8 +22,8 @@ Made by
 
     python -m mpgrasp.training generate --scenes {scenes} --seed {seed} --views {views} --out DIR{options}
 
-{n_scenes} scenes, {n_views} views. A scene is a function of the seed and its index alone
-(`mpgrasp.training.generate.make_scene(seed, index)` builds it again). None of the objects is one of the
+{n_scenes} scenes, {n_views} views. A scene is a function of the seed, its index and the format ({format})
+alone (`mpgrasp.training.generate.make_scene(seed, index)` builds it again). None of the objects is one of the
 evaluation sets', or comes close to the size of one.
 
 ## Lifts
@@ -64,7 +64,7 @@ def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) 
     Raises:
         OutputError: it cannot be written.
     """
-    from mpgrasp.training.shards import SHARD_SCENES
+    from mpgrasp.training.shards import FORMAT, SHARD_SCENES
     from mpgrasp.training.views import META_COLUMNS
 
     trials = []
@@ -77,6 +77,7 @@ def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) 
         scenes=config.scenes,
         seed=config.seed,
         views=config.views,
+        format=FORMAT,
         options=options + ("" if config.colour else " --no-colour"),
         n_scenes=config.scenes,
         n_views=config.scenes * config.views,

@@ -1,6 +1,6 @@
 """Training shards in memory, and augmented batches from them.
 
-A shard is `shard_00000.npz` as `generate` writes it (format 2): `depth`, `quality`, `angle` and `width`, each
+A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each
 (n, 224, 224) in the units of labels.py, `rgb` (n, 224, 224, 3), and `meta` (n, k), whose columns are the
 "meta_columns" of meta.json beside it. Colour is read only where it is asked for.
 
@@ -25,9 +25,8 @@ from mpgrasp.detectors.network_input import NetworkInput
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation, Sample, augment
 from mpgrasp.training.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
+from mpgrasp.training.shards import FORMAT
 
-FORMAT = 2
-"""Of shards that can be read."""
 SCENE_COLUMN = "scene"
 """Images of one scene are either all held out or none."""
 
@@ -136,7 +135,7 @@ class GraspDataset:
         for directory, meta in self._told.items():
             shards = sum(path.parent == directory for path in self._paths)
             making: dict[str, object] = {
-                k: meta[k] for k in ("seed", "views", "shard_scenes", "camera") if k in meta
+                k: meta[k] for k in ("format", "seed", "views", "shard_scenes", "camera") if k in meta
             }
             about.append({"name": directory.name, "shards": shards, **making, **self._lifts(directory)})
         return about
@@ -212,17 +211,18 @@ def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
 def _read_description(directory: Path) -> dict[str, Any]:
     path = directory / "meta.json"
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        told = {**told, "meta_columns": [str(name) for name in told["meta_columns"]]}
+        told = dict(json.loads(path.read_text(encoding="utf-8")))
+        if told.get("format") != FORMAT:
+            raise ConfigError(
+                f"shards of another format in {directory.name}",
+                got=told.get("format", "none"),
+                allowed=f"{FORMAT}; generate them anew",
+            )
+        return told | {"meta_columns": [str(name) for name in told["meta_columns"]]}
+    except ConfigError:
+        raise
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"unreadable description of shards: {error!r}", got=str(path)) from error
-    if told.get("format") != FORMAT:
-        raise ConfigError(
-            f"shards of another format in {directory.name}",
-            got=told.get("format"),
-            allowed=f"{FORMAT}; generate them anew",
-        )
-    return told
 
 
 def _read_shard(path: Path, *, colour: bool) -> dict[str, np.ndarray]:

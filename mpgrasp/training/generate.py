@@ -2,8 +2,8 @@
 
 `python -m mpgrasp.training generate --scenes 2000 --out DIR` writes shards `shard_00000.npz` of
 `SHARD_SCENES` scenes each, `meta.json` and `README.md` that describe them, and `sheet.png` to look at. A
-scene is a function of the seed and its index alone, so neither the number of workers nor an interruption
-changes a byte; finished shards are kept.
+scene is a function of the seed, its index and the format (`shards.FORMAT`) alone, so neither the number of
+workers nor an interruption changes a byte; finished shards are kept.
 """
 
 from __future__ import annotations
@@ -11,18 +11,25 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from mpgrasp.camera import BACKENDS
-from mpgrasp.exceptions import CameraError, ConfigError
+from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError
 from mpgrasp.training import shards
 from mpgrasp.training.generate_config import GenerateConfig
 from mpgrasp.training.views import make_scene, make_views
 
 __all__ = ["GenerateConfig", "add_arguments", "generate", "main", "make_scene", "make_views"]
+
+Job = tuple[GenerateConfig, range, Path]
+"""The scenes of a shard, and where it goes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +58,13 @@ def main(args: argparse.Namespace) -> int:
 
 
 def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: bool = True) -> list[Path]:
-    """Write the data set; shards that are there already are kept.
+    """Write the data set; shards that are there already, with all of their scenes, are kept.
 
     Raises:
-        ConfigError: fewer than one worker, or `out` holds data of another configuration.
+        ConfigError: fewer than one worker, or `out` holds data of another configuration, or more scenes.
         CameraError: colour is wanted, and there is no OpenGL to draw it.
         OutputError: `out` cannot be written.
+        MpgraspError: a worker process was killed.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
@@ -65,12 +73,8 @@ def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: b
     if config.colour:
         _require_colour()
     shards.prepare(config, out)
-    starts = range(0, config.scenes, shards.SHARD_SCENES)
-    jobs = [
-        (config, range(s, min(s + shards.SHARD_SCENES, config.scenes)), shards.shard_path(out, s))
-        for s in starts
-    ]
-    waiting = [job for job in jobs if not job[2].is_file()]
+    paths = list(shards.planned(config, out))
+    waiting = [(config, scenes, path) for path, scenes in shards.unfinished(config, out).items()]
     columns = (
         "generate",
         BarColumn(),
@@ -80,17 +84,10 @@ def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: b
         TimeRemainingColumn(),
     )
     with Progress(*columns, disable=not progress) as bar:
-        task = bar.add_task("generate", total=len(jobs), completed=len(jobs) - len(waiting))
-        if workers == 1 or len(waiting) < 2:
-            for job in waiting:
-                _write_shard(job)
-                bar.advance(task)
-        else:
-            # spawned, not forked: an OpenGL context does not survive a fork
-            with multiprocessing.get_context("spawn").Pool(min(workers, len(waiting)), _one_thread) as pool:
-                for _ in pool.imap_unordered(_write_shard, waiting):
-                    bar.advance(task)
-    paths = [job[2] for job in jobs]
+        task = bar.add_task("generate", total=len(paths), completed=len(paths) - len(waiting))
+        alone = workers == 1 or len(waiting) < 2
+        for _ in map(_write_shard, waiting) if alone else _written_by_workers(waiting, workers):
+            bar.advance(task)
     from mpgrasp.training.data_card import write_data_card
     from mpgrasp.training.sheet import write_sheet
 
@@ -108,11 +105,34 @@ def _require_colour() -> None:
         raise CameraError("no colour without OpenGL", got=str(error), allowed="--no-colour") from None
 
 
-def _one_thread() -> None:
+def _written_by_workers(jobs: Sequence[Job], workers: int) -> Iterator[None]:
+    """Yields whenever a shard is written.
+
+    Raises:
+        MpgraspError: a worker process was killed.
+    """
+    # spawned, not forked: an OpenGL context does not survive a fork
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _start_worker) as pool:
+        try:
+            for written in as_completed([pool.submit(_write_shard, job) for job in jobs]):
+                yield written.result()
+        except BrokenProcessPool:
+            raise MpgraspError(
+                "a worker process was killed",
+                got=f"{workers} workers",
+                allowed="memory for all of them; finished shards are kept, and the same command goes on",
+            ) from None
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _start_worker() -> None:
     cv2.setNumThreads(1)  # the workers fill the cores
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends them without a traceback each
 
 
-def _write_shard(job: tuple[GenerateConfig, range, Path]) -> None:
+def _write_shard(job: Job) -> None:
     config, indices, path = job
     scenes = [make_views(config, index) for index in indices]
     shards.write_shard(path, {name: np.concatenate([s[name] for s in scenes]) for name in scenes[0]})

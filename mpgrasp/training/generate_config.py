@@ -15,7 +15,7 @@ class GenerateConfig:
     scenes: int
     """Number of scenes."""
     seed: int = 1
-    """Of the data set; scene k of a seed is the same in every set."""
+    """Of the data set; scene k of a seed is the same in every set of one format."""
     views: int = 4
     """Images of each scene."""
     camera: str = "auto"

@@ -106,7 +106,10 @@ def resembles_evaluation_object(size: ArrayLike) -> bool:
 
 @cache
 def _evaluation_sizes() -> FloatArray:
-    """(n, 3) sorted edges of the bounding boxes of the catalogue's and all shipped suites' objects [m]."""
+    """(n, 3) sorted edges of the bounding boxes of the catalogue's and all shipped suites' objects [m].
+
+    What a seed means depends on them: where they change, `shards.FORMAT` has to be counted up.
+    """
     catalogue: list[str | ObjectModel] = [name for names in OBJECT_SETS.values() for name in names]
     declared = [o for name in suite_names() for scene in load_suite(name).scenes for o in scene.objects]
     models = [load_object(o) if isinstance(o, str) else o for o in catalogue + declared]

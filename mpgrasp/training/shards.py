@@ -5,19 +5,25 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from mpgrasp.depth import CROP, NETWORK_SIZE
 from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.plain import difference
+from mpgrasp.replace_file import replace_file
 from mpgrasp.training.generate_config import GenerateConfig
 from mpgrasp.training.labels import ANGLE_UNIT, DEPTH_UNIT, QUALITY_UNIT
 from mpgrasp.training.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMNS
 from mpgrasp.training.views import META_COLUMNS
 
-FORMAT = 2
-"""Of shards and `meta.json`."""
+FORMAT = 3
+"""Of shards and `meta.json`, and of what a seed means: a scene is a function of the seed, its index and this.
+
+When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do
+not show. An object that joins the catalogue or a shipped suite is enough, for training keeps away from it."""
 SHARD_SCENES = 20
 """Scenes in a shard."""
 
@@ -55,21 +61,64 @@ def prepare(config: GenerateConfig, out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if path.is_file():
-            if json.loads(path.read_text(encoding="utf-8")) != describe(config):
+            other = difference(json.loads(path.read_text(encoding="utf-8")), describe(config))
+            if other:
                 raise ConfigError(
-                    "the directory holds other data", got=str(out), allowed="an empty directory"
+                    f"the directory holds other data ({other.words('there', 'here')})",
+                    got=str(out),
+                    allowed="an empty directory",
                 )
             return
-        path.write_text(json.dumps(describe(config), indent=2) + "\n", encoding="utf-8")
+        replace_file(path, json.dumps(describe(config), indent=2) + "\n")
+    except ConfigError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, ConfigError):
-            raise
         raise OutputError("cannot write training data", got=str(out), allowed=str(error)) from None
 
 
 def shard_path(out: Path, first_scene: int) -> Path:
     """Where the shard lies that begins with that scene."""
     return out / f"shard_{first_scene // SHARD_SCENES:05d}.npz"
+
+
+def planned(config: GenerateConfig, out: Path) -> dict[Path, range]:
+    """Paths of all shards of the set, and the scenes in each."""
+    return {
+        shard_path(out, first): range(first, min(first + SHARD_SCENES, config.scenes))
+        for first in range(0, config.scenes, SHARD_SCENES)
+    }
+
+
+def unfinished(config: GenerateConfig, out: Path) -> dict[Path, range]:
+    """Those planned shards that are not there with exactly their scenes; an unreadable one is not there.
+
+    Raises:
+        ConfigError: the directory holds scenes beyond the last, which training would read too.
+    """
+    plan = planned(config, out)
+    there = {path: _scenes(path) for path in sorted(out.glob("shard_*.npz"))}
+    beyond = [p for p, scenes in there.items() if p not in plan or max(scenes, default=0) >= config.scenes]
+    if beyond:
+        raise ConfigError(
+            "the directory holds scenes beyond the last one",
+            got=", ".join(path.name for path in beyond),
+            allowed=f"more than {config.scenes} scenes, or another directory",
+        )
+    return {
+        path: scenes
+        for path, scenes in plan.items()
+        if there.get(path) != np.repeat(scenes, config.views).tolist()
+    }
+
+
+def _scenes(path: Path) -> list[int]:
+    """The scene that each row of a shard shows; none where it cannot be read."""
+    try:
+        with np.load(path) as arrays:
+            scenes: list[int] = arrays["meta"][:, META_COLUMNS.index("scene")].astype(int).tolist()
+            return scenes
+    except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile, zlib.error):
+        return []
 
 
 def write_shard(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mpgrasp import paths
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.network_input import CHANNELS, NetworkInput
 from mpgrasp.detectors.networks import INPUT_SIZE
@@ -40,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="directories to validate on (default: held out)",
     )
-    add("--out", type=Path, metavar="FILE", help="weights file (default: the shipped one)")
+    add("--out", type=Path, metavar="FILE", help="weights file (default: out/NAME.safetensors)")
     add("--curves", type=Path, metavar="DIR", help="where the curves go (default: beside the weights)")
     add(
         "--input",
@@ -111,7 +110,7 @@ def main(args: argparse.Namespace) -> int:
 
     if args.threads is not None:
         torch.set_num_threads(args.threads)
-    out: Path = args.out or paths.WEIGHTS / f"{config.name}.safetensors"
+    out: Path = args.out or Path("out", f"{config.name}.safetensors")
     colour = config.input.reads_colour
     separate = GraspDataset(args.validation, holdout=0, colour=colour) if args.validation else None
     dataset = GraspDataset(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,9 +32,9 @@ class LossConfig:
     """Weight of the width."""
 
     def __post_init__(self) -> None:
-        weights = (self.positive, self.background, self.quality_weight, self.width_weight)
-        if min(weights) < 0 or self.beta <= 0:
-            raise ConfigError("unusable loss settings", got=self, allowed="weights from 0, beta above 0")
+        _require(self, "a finite number above 0", lambda v: v > 0, "beta")
+        weights = ("positive", "background", "quality_weight", "width_weight")
+        _require(self, "a finite number from 0", lambda v: v >= 0, *weights)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,14 +88,17 @@ class TrainConfig:
             raise ConfigError("unknown schedule", got=self.schedule, allowed=("cosine", "constant"))
         if self.precision not in ("bfloat16", "float32"):
             raise ConfigError("unknown precision", got=self.precision, allowed=("bfloat16", "float32"))
-        positive = (self.epochs, self.batch, self.lr, self.validate_every, self.thin_weight)
-        if min(positive) <= 0 or (self.minutes is not None and self.minutes <= 0):
-            raise ConfigError(
-                "unusable training settings", got=self, allowed="sizes, times and rates above 0"
-            )
-        if min(self.validation_images, self.lift_images) < 0 or (self.images is not None and self.images < 1):
-            raise ConfigError(
-                "unusable number of images", got=self, allowed="0 or more, 1 or more to train on"
-            )
-        if not 0 <= self.average < 1:
-            raise ConfigError("unusable running average", got=self.average, allowed="from 0 to below 1")
+        above_0 = ("epochs", "minutes", "lr", "validate_every", "thin_weight")
+        _require(self, "a finite number above 0", lambda v: v > 0, *above_0)
+        _require(self, "a finite number from 0", lambda v: v >= 0, "weight_decay")
+        _require(self, "from 0 to below 1", lambda v: 0 <= v < 1, "average")
+        _require(self, "1 or more", lambda v: v >= 1, "batch", "images")
+        _require(self, "0 or more", lambda v: v >= 0, "validation_images", "lift_images", "seed")
+
+
+def _require(config: object, allowed: str, right: Callable[[float], bool], *names: str) -> None:
+    """Raise ConfigError for the first of these fields that is neither None nor finite and right."""
+    for name in names:
+        value = getattr(config, name)
+        if value is not None and not (math.isfinite(value) and right(value)):
+            raise ConfigError(f"unusable {name}", got=value, allowed=allowed)
