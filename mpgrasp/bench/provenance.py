@@ -24,6 +24,7 @@ PACKAGES = (
     "numpy",
     "opencv-python-headless",
     "openvino",
+    "pyopengl",
     "qpsolvers",
     "scipy",
     "torch",
