@@ -35,9 +35,9 @@ class MppcConfig:
     alpha: float = 0.2
     """Attenuation of the horizontal velocity while the quality map has no peak; MP-PC only."""
     peak_threshold: float = 0.34
-    """There is a peak where the 3x3 mean of the quality exceeds this; MP-PC only. Chosen by Youden's J over the
-    shipped detectors' grasps in held-out scenes (benchmarks/held_out.py, "together": 0.32 to 0.44); it lies
-    within each detector's own interval."""
+    """There is a peak where the 3x3 mean of the quality exceeds this; MP-PC only. Chosen by Youden's J over
+    the shipped detectors' grasps in held-out scenes (benchmarks/held_out.py, "together": 0.32 to 0.44); it
+    lies within each detector's own interval."""
     z_max: float = 0.50
     """Height of the tcp where the reach begins [m]."""
     z_min: float = 0.175
