@@ -62,12 +62,6 @@ def time_limits(cells: Cells) -> dict[str, float | None]:
     return limits
 
 
-def time_of(line: Mapping[str, Any]) -> float:
-    """Simulated time of an episode [s]; a table that was not cleared would have taken its limit or more."""
-    unfinished = not line["success"] and line.get("time_limit_s") is not None
-    return float(line["time_limit_s"] if unfinished else line["sim_time_s"])
-
-
 def restricted_time(line: Mapping[str, Any], limit: float | None = None) -> float:
     """Simulated time of an episode cut off at its limit, or else at `limit` [s].
 
@@ -85,7 +79,7 @@ def _cell(
     played = [line for line in lines if line["outcome"] != ERROR]
     n, successes = len(played), sum(bool(line["success"]) for line in played)
     low, high = wilson_interval(successes, n)
-    times = [time_of(line) for line in played]
+    times = [restricted_time(line) for line in played]
     middle, middle_low, middle_high = median_interval(times)
     mean, mean_low, mean_high = mean_interval(restricted(times, limit))
     objects: dict[str, dict[str, int]] = {}
