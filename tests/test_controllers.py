@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from controller_parts import MppcByMean
 from toy_views import T_TCP_CAMERA, Blob, blob_map, flat_map, fly
 
 from mpgrasp.controllers import CONTROLLERS, make_controller
@@ -348,6 +349,21 @@ def test_mvp_trusts_many_views_over_the_best_one() -> None:
         grasps[name] = grasp.position[:2]
     assert np.hypot(*(grasps["mvp"] - [steady.x, steady.y])) < 0.006
     assert np.hypot(*(grasps["mppc"] - [flicker.x, flicker.y])) < 0.006
+
+
+def test_mppc_by_mean_grasps_as_mvp_does_and_goes_sideways_as_mppc_does() -> None:
+    flicker, steady = Blob(x=0.55, y=0.05, quality=lambda height: 1.0), Blob(x=0.48, y=-0.03)
+    hybrid, mvp, mppc = MppcByMean(), make_controller("mvp"), make_controller("mppc")
+    views: list[Blob | float] = [0.3, *(flicker if tick == 3 else steady for tick in range(12))]
+    for view in views:
+        ours, full, slow = (c.update(observe((0.43, 0.0, 0.4), view)) for c in (hybrid, mvp, mppc))
+        assert same(ours, full) == (view != 0.3)
+        np.testing.assert_array_equal(ours.twist[:3], slow.twist[:3])
+    one, other = hybrid.final_grasp(), mvp.final_grasp()
+    assert one is not None
+    assert other is not None
+    np.testing.assert_array_equal(one.position, other.position)
+    assert (one.angle, one.width, one.quality) == (other.angle, other.width, other.quality)
 
 
 def test_open_loop_takes_the_best_pixel_of_its_first_view_and_looks_no_further() -> None:
