@@ -211,8 +211,9 @@ class Execution:
         if reflex is not None:
             return ExecutionResult(outcome="reflex", reason=f"{reflex} while in phase {self.phase}")
         left, right = self.simulation.pad_contacts()
+        raised = [name for name in self.rest if self._height(name) - self.rest[name] >= c.success_height]
         for name in sorted(left & right):
-            if self._height(name) - self.rest[name] >= c.success_height:
+            if name in raised:
                 return ExecutionResult(outcome="success", reason=f"{name} is held", lifted=name)
         if self.between:
             names = ", ".join(self.between)
@@ -224,7 +225,11 @@ class Execution:
                 f"planned were {1e3 * max(self.planned, 0.0):.1f} mm"
             )
             return ExecutionResult(outcome="collision", reason=reason)
-        return ExecutionResult(outcome="missed", reason="nothing stood between the closed pads")
+        reason = "nothing stood between the closed pads"
+        if raised:
+            # a ring on a hook: no grasp, for nothing but luck keeps it there
+            reason += f"; {', '.join(raised)} came up hanging on the fingers"
+        return ExecutionResult(outcome="missed", reason=reason)
 
     def _pose(self, z: float) -> FloatArray:
         return looking_down([self.grasp.position[0], self.grasp.position[1], z], self.yaw)

@@ -140,6 +140,20 @@ def test_closing_beside_the_object_is_a_miss() -> None:
     assert result.width < 0.001
 
 
+def test_what_hangs_on_the_closed_fingers_like_a_ring_on_a_hook_is_not_grasped() -> None:
+    # a portal: the fingers straddle its beam and close in the opening below
+    beam = Part(shape="box", size=(0.035, 0.008, 0.004), position=(0.0, 0.0, 0.066))
+    posts = [Part(shape="box", size=(0.004, 0.008, 0.031), position=(x, 0.0, 0.031)) for x in (-0.031, 0.031)]
+    driver = driver_over(scene_with(stick(0.07, mass=0.03, parts=(beam, *posts), rolls=False), 0), z=0.3)
+    T = driver.simulation.object_pose("stick")
+    angle = float(wrap_half_pi(np.arctan2(T[1, 1], T[0, 1])))
+    grasp = Grasp(position=T[:3, 3] + [0.0, 0.0, 0.07], angle=angle, width=0.016, quality=1.0)
+    result = execute_grasp(driver, grasp)
+    assert driver.simulation.object_pose("stick")[2, 3] - T[2, 3] > 0.1
+    assert (result.outcome, result.lifted, result.between) == ("missed", None, ())
+    assert "stick came up hanging on the fingers" in result.reason
+
+
 def test_landing_on_an_object_is_a_collision() -> None:
     model = stick(0.03, width=0.06, length=0.15, mass=0.2)
     driver = driver_over(scene_with(model, 0))
