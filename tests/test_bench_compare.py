@@ -238,6 +238,26 @@ def test_a_configuration_that_differs_is_named(tmp_path: Path, capsys: pytest.Ca
     assert "Not the same in both: noise: null in A, 0 in B" in capsys.readouterr().out
 
 
+def test_suites_are_compared_by_name_whether_a_programme_played_them_or_a_run_of_their_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def told(alone: dict[str, Any], programme: list[dict[str, Any]]) -> list[str]:
+        a, b = tmp_path / "a" / "run.json", tmp_path / "b" / "run.json"
+        a.write_text(json.dumps({"configuration": {"seed": 0, **alone}}))
+        b.write_text(json.dumps({"configuration": {"seed": 0, "suite": "paper", "suites": programme}}))
+        main(["compare", str(a.parent), str(b.parent)])
+        return [text for text in capsys.readouterr().out.splitlines() if text.startswith("Not the same")]
+
+    def played(name: str, limit: float) -> dict[str, Any]:
+        return {"suite": {"name": name, "trial": "clear"}, "episode": {"time_limit": limit}}
+
+    for name in "ab":
+        run_with(tmp_path / name, "1")
+    assert told(played("s", 9.0), [played("t", 5.0), played("s", 9.0)]) == []
+    changed = told(played("s", 9.0), [played("t", 5.0), played("s", 8.0)])
+    assert changed == ["Not the same in both: s.episode.time_limit: 9.0 in A, 8.0 in B"]
+
+
 @pytest.fixture
 def run(fake_world: object, tmp_path: Path) -> Path:
     cells = [*PLUG_INS[:3], "fakes:FakeController,fakes:OtherController", *PLUG_INS[4:]]

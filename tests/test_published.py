@@ -26,7 +26,7 @@ def digests(value: Any) -> Iterator[tuple[str, str]]:
         for key, item in value.items():
             if key == "weights_sha256":  # of a study, by detector; None where a network was not trained
                 yield from ((name, digest) for name, digest in item.items() if digest is not None)
-            else:
+            elif key != "objects":  # meshes have a name and a digest too
                 yield from digests(item)
     elif isinstance(value, list):
         for item in value:

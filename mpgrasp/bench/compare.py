@@ -19,11 +19,11 @@ from mpgrasp.bench.statistics import SIGNIFICANCE, holm, restricted, wilcoxon
 from mpgrasp.bench.summary import Cells, restricted_time
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.plain import difference
+from mpgrasp.plain import Difference, difference
 
 EXIT_WORSE = 1
-_SHARED = ("suite", "episode", "seed", "camera", "noise")
-"""Parts of a configuration that two runs should agree in to be compared."""
+_SHARED = ("seed", "camera", "noise")
+"""Parts of a configuration that two runs should agree in to be compared, beside their common suites."""
 
 _EPILOG = """\
 A and B are folders of runs, or single cells of them: RUN/DETECTOR/CONTROLLER. Cells of the same name are
@@ -91,6 +91,20 @@ class Comparison:
         return found
 
 
+def unequal_conditions(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Difference]:
+    """Where two configurations differ in what decides the worlds and the episodes that both played."""
+    one, other = _suites(before), _suites(after)
+    found = [difference(before.get(key), after.get(key), key) for key in _SHARED]
+    found += [difference(one[name], other[name], name) for name in one if name in other]
+    return [changed for changed in found if changed]
+
+
+def _suites(configuration: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Declaration and settings by suite, of a run of one suite or of a programme of several."""
+    parts = configuration.get("suites") or [configuration]
+    return {part["suite"]["name"]: {key: part.get(key) for key in ("suite", "episode")} for part in parts}
+
+
 def compare(a: Cells, b: Cells) -> list[Comparison]:
     """All cells in common, with p after Holm's correction over all tests of all of them.
 
@@ -149,10 +163,8 @@ def main(command: Sequence[str]) -> int:
     rows = compare(a, b)
     print(f"A = {folder_a}\nB = {folder_b}")
     before, after = (read_run(folder)["configuration"] for folder in (folder_a, folder_b))
-    for key in _SHARED:
-        changed = difference(before.get(key), after.get(key), key)
-        if changed:
-            print(f"Not the same in both: {changed.words('in A', 'in B')}")
+    for changed in unequal_conditions(before, after):
+        print(f"Not the same in both: {changed.words('in A', 'in B')}")
     for side, cells, shown in (("A", a, {row.a for row in rows}), ("B", b, {row.b for row in rows})):
         alone = [f"{name.suite}/{name}" for name in map(CellName._make, cells) if name not in shown]
         if alone:
