@@ -71,8 +71,8 @@ def test_drift_before_the_first_detection_of_thin_sticks() -> None:
         found.append(paired(mppc, mvp, lambda line: 1e3 * line["blind_drift_m"]))
     slow, full, p = zip(*found, strict=True)
     assert (
-        f"MVP drifts {full[0]:.0f} mm sideways with DHRNet, {full[1]:.0f} with TF-Grasp and {full[2]:.0f} with "
-        f"GG-CNN2, MP-PC {slow[0]:.0f}, {slow[1]:.0f} and {slow[2]:.0f} mm"
+        f"MVP drifts {full[0]:.0f} mm sideways with DHRNet, {full[1]:.0f} with TF-Grasp and {full[2]:.0f} "
+        f"with GG-CNN2, MP-PC {slow[0]:.0f}, {slow[1]:.0f} and {slow[2]:.0f} mm"
     ) in README
     # Holm's largest: the greatest p, unless a smaller one times its rank is greater
     assert max(x * k for x, k in zip(sorted(p), (3, 2, 1), strict=True)) < 0.0065
