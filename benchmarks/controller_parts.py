@@ -6,10 +6,11 @@ To be played by `python -m mpgrasp.bench stacked --controller benchmarks.control
 from __future__ import annotations
 
 from mpgrasp.controllers.mppc import Mppc
+from mpgrasp.controllers.mvp import Mvp
 from mpgrasp.grasp import Grasp
 
 
-class MppcByMean(Mppc):
+class MppcByMean(Mppc, Mvp):
     """Moves as MP-PC does, attenuated where nothing is seen, and grasps as MVP does: at the grid map's best
     cell, whose quality is the mean of all views (eq. 6), not at the best pixel of any one view.
     """
@@ -17,5 +18,4 @@ class MppcByMean(Mppc):
     name = "mppc_by_mean"
 
     def final_grasp(self) -> Grasp | None:
-        best = self.grid.best_grasp()
-        return best if best is not None and best.quality >= self.config.min_quality else None
+        return Mvp.final_grasp(self)

@@ -142,6 +142,7 @@ class Episode:
         self.start_time, self._first_tick = self.simulation.time, self.ticks
         self.metrics = ReachMetrics()
         self._grasp: Grasp | None = None
+        self._reason = ""
         truth = reads_truth(self.detector)
         self.detector.reset(self.scene.height_map(data=self.simulation.data) if truth else None)
 
@@ -195,6 +196,7 @@ class Episode:
             self._grasp = grasp
             execution = execute_grasp(self.driver, grasp, self.config.execution, on_tick=self.record_motion)
             outcome, lifted = Outcome(execution.outcome), execution.lifted
+            self._reason = execution.reason
         assert outcome is not None
         return self._result(outcome, lifted, reach)
 
@@ -259,7 +261,8 @@ class Episode:
         )
 
     def _verdict(self, outcome: Outcome) -> str:
-        return f"{outcome}: {self.driver.reflex}" if outcome is Outcome.REFLEX else str(outcome)
+        reason = str(self.driver.reflex) if outcome is Outcome.REFLEX else self._reason
+        return f"{outcome}: {reason}" if reason else str(outcome)
 
     def _record(
         self,

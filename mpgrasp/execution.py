@@ -228,7 +228,7 @@ class Execution:
         reason = "nothing stood between the closed pads"
         if raised:
             # a ring on a hook: no grasp, for nothing but luck keeps it there
-            reason += f"; {', '.join(raised)} came up hanging on the fingers"
+            reason = f"{', '.join(raised)} came up hanging on the fingers, not between the pads"
         return ExecutionResult(outcome="missed", reason=reason)
 
     def _pose(self, z: float) -> FloatArray:

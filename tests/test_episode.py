@@ -18,6 +18,7 @@ from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.height_map import HeightMap
 from mpgrasp.rasteriser import require_gl
+from mpgrasp.recording import NullRecorder
 from mpgrasp.scene import WORKSPACE_CENTRE, SceneConfig
 
 SCENE = SceneConfig(objects=("usb_stick",), half_extent=0.08)
@@ -43,6 +44,15 @@ class Blind:
             T_world_camera=frame.T_world_camera,
             time=frame.time,
         )
+
+
+class LastWords(NullRecorder):
+    """Keeps what a recording ends with."""
+
+    heard = ""
+
+    def finish(self, event: str) -> None:
+        self.heard = event
 
 
 class Scripted:
@@ -193,8 +203,10 @@ def test_seeing_nothing_ends_without_a_grasp_and_without_touching_anything() -> 
 def test_a_grasp_beside_the_object_misses() -> None:
     empty = Grasp(position=np.array([0.62, 0.2, 0.0]), angle=0.3, width=0.04, quality=1.0)
     controller = Scripted((0, 0, 0, 0, 0, 0), ticks=1, grasp=empty)
-    result = run_episode(SCENE, 2, detector=Blind(), controller=controller, config=QUICK)
+    words = LastWords()
+    result = run_episode(SCENE, 2, detector=Blind(), controller=controller, config=QUICK, recorder=words)
     assert result.outcome is Outcome.MISSED
+    assert words.heard == "missed: nothing stood between the closed pads"
 
 
 def test_driving_out_of_reach_ends_in_a_reflex_that_names_its_limit() -> None:
