@@ -27,17 +27,16 @@ import study
 from reliability import calibration, choose_threshold, draw_peaks, draw_reliability
 
 from mpgrasp.controllers.config import MppcConfig
-from mpgrasp.controllers.reaching import peak_height
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.grasp import Grasp, best_pixel
-from mpgrasp.lift_trial import LiftRig
-from mpgrasp.scene import Scene
+from mpgrasp.grasp import Grasp, best_pixel, peak_height
+from mpgrasp.motion.lift_trial import LiftRig
+from mpgrasp.scene.scene import Scene
+from mpgrasp.training.data.views import CAMERA_HEIGHT, stored_intrinsics, stored_pose
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.generate import make_scene
 from mpgrasp.training.metrics import judge
-from mpgrasp.training.views import CAMERA_HEIGHT, stored_intrinsics, stored_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mpgrasp import make_controller, make_detector, run_episode
-from mpgrasp.bench.suite import episode_seed, load_suite
-from mpgrasp.film import FilmRecorder
+from mpgrasp.recording.film import FilmRecorder
+from mpgrasp.suite import episode_seed, load_suite
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "episode.png"
 

@@ -20,14 +20,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import study
+from mpgrasp.workspace import WORKSPACE_CENTRE
 from timed_network import WIDE, Entry, available_runtimes, make_entry, network_size, time_all, weights_for
 
-from mpgrasp.bench.suite import episode_seed, load_suite
-from mpgrasp.camera import BACKENDS, WristCamera
+from mpgrasp.camera.wrist_camera import BACKENDS, WristCamera
 from mpgrasp.depth import CROP, DepthFrame
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
-from mpgrasp.scene import WORKSPACE_CENTRE, build_scene
+from mpgrasp.scene.scene import build_scene
+from mpgrasp.suite import episode_seed, load_suite
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -152,7 +153,7 @@ def _study(command: Sequence[str]) -> None:
     study.prepare(options.out)
     import torch
 
-    from mpgrasp.detectors.networks import NETWORKS
+    from mpgrasp.detectors.networks.registry import NETWORKS
 
     known = [*NETWORKS, WIDE]
     names = options.network.split(",") if options.network else known

@@ -77,16 +77,16 @@ class Stopwatch:
 
 def play(ticks: int, camera_backend: str, seed: int) -> tuple[Stopwatch, list[Any], str]:
     """Time reaches until there are enough ticks; returns the times, some images and the camera's backend."""
-    from mpgrasp import sensor_noise
-    from mpgrasp.bench.suite import episode_seed, load_suite
-    from mpgrasp.camera import WristCamera
+    from mpgrasp.camera import noise as sensor_noise
+    from mpgrasp.camera.wrist_camera import WristCamera
     from mpgrasp.controllers import make_controller
     from mpgrasp.controllers.controller import Observation
+    from mpgrasp.controllers.grid_map import GridMap
     from mpgrasp.detectors import make_detector
-    from mpgrasp.grid_map import GridMap
-    from mpgrasp.motion import ArmDriver
-    from mpgrasp.scene import build_scene
-    from mpgrasp.simulation import Simulation
+    from mpgrasp.motion.arm_driver import ArmDriver
+    from mpgrasp.scene.scene import build_scene
+    from mpgrasp.scene.simulation import Simulation
+    from mpgrasp.suite import episode_seed, load_suite
 
     watch = Stopwatch()
     frames: list[Any] = []

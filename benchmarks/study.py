@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from mpgrasp import command_line
-from mpgrasp.bench.plugins import load_detector
-from mpgrasp.bench.provenance import provenance, sha256
-from mpgrasp.bench.statistics import holm, mcnemar, wilson_interval
+from mpgrasp.bench.results.provenance import provenance, sha256
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.files.atomic import replace_file
+from mpgrasp.files.json_values import plain
 from mpgrasp.paths import WEIGHTS
-from mpgrasp.plain import plain
-from mpgrasp.replace_file import replace_file
+from mpgrasp.plugins import load_detector
+from mpgrasp.statistics import holm, mcnemar, wilson_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
+from mpgrasp.scene.config import SceneConfig
 from study import (
     RESULTS,
     Parser,
@@ -36,18 +37,17 @@ from study import (
     track,
 )
 
-from mpgrasp.bench.suite import episode_seed
-from mpgrasp.camera import BACKENDS, WristCamera
+from mpgrasp.camera.wrist_camera import BACKENDS, WristCamera
 from mpgrasp.controllers.config import MppcConfig
-from mpgrasp.controllers.reaching import peak_height
 from mpgrasp.depth import CROP
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, line_angle_difference, looking_down
-from mpgrasp.grasp import GraspMap, best_pixel
-from mpgrasp.object_model import ObjectModel, Part
-from mpgrasp.scene import SceneConfig, build_scene
-from mpgrasp.training.views import CAMERA_OVER_TCP
+from mpgrasp.grasp import GraspMap, best_pixel, peak_height
+from mpgrasp.scene.objects.model import ObjectModel, Part
+from mpgrasp.scene.scene import build_scene
+from mpgrasp.suite import episode_seed
+from mpgrasp.training.data.views import CAMERA_OVER_TCP
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

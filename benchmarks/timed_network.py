@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from torch import nn
 
     from mpgrasp.detectors.network_detector import NetworkDetector
-    from mpgrasp.detectors.network_input import NetworkInput
-    from mpgrasp.detectors.runtime import Runtime
-    from mpgrasp.detectors.weights import NetworkWeights
+    from mpgrasp.detectors.networks.input import NetworkInput
+    from mpgrasp.detectors.networks.weights import NetworkWeights
+    from mpgrasp.detectors.runtimes.runtime import Runtime
 
 WIDE = "dhrnet width 48"
 """DHRNet as wide as the authors'."""
@@ -65,10 +65,10 @@ def weights_for(name: str) -> tuple[NetworkWeights, bool]:
     Raises:
         ConfigError: there is no such network.
     """
-    from mpgrasp.detectors.dhrnet import AUTHORS
-    from mpgrasp.detectors.network_input import NetworkInput
-    from mpgrasp.detectors.networks import INPUT_SIZE, build_network
-    from mpgrasp.detectors.weights import NetworkWeights, default_weights, load_weights
+    from mpgrasp.detectors.networks.dhrnet import AUTHORS
+    from mpgrasp.detectors.networks.input import NetworkInput
+    from mpgrasp.detectors.networks.registry import INPUT_SIZE, build_network
+    from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
 
     if name != WIDE and default_weights(name).is_file():
         return load_weights(name), True
@@ -94,8 +94,8 @@ def _settle(network: nn.Module, image: NetworkInput) -> None:
 
 def make_runtime(weights: NetworkWeights, runtime: str) -> Runtime:
     """One of `RUNTIMES`, ready to be called."""
-    from mpgrasp.detectors.openvino_runtime import OpenVinoRuntime
-    from mpgrasp.detectors.runtime import TorchRuntime
+    from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime
+    from mpgrasp.detectors.runtimes.runtime import TorchRuntime
 
     if runtime.startswith("torch"):
         return TorchRuntime(weights, plain=runtime == "torch plain")
@@ -104,7 +104,7 @@ def make_runtime(weights: NetworkWeights, runtime: str) -> Runtime:
 
 def available_runtimes() -> tuple[str, ...]:
     """Those of `RUNTIMES` that this machine has; bfloat16 only where the processor computes in it."""
-    from mpgrasp.detectors.openvino_runtime import openvino_precision
+    from mpgrasp.detectors.runtimes.openvino import openvino_precision
 
     last = {None: 2, "f32": 3, "bf16": 4}[openvino_precision()]
     return RUNTIMES[:last]
@@ -162,7 +162,7 @@ def time_all(
 
 def network_size(weights: NetworkWeights, shipped: bool) -> dict[str, Any]:
     """Parameters, FLOPs of an image, and whose weights they are."""
-    from mpgrasp.detectors.cost import flops, parameters
+    from mpgrasp.detectors.networks.cost import flops, parameters
 
     image = weights.input
     return {

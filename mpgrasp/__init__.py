@@ -10,44 +10,9 @@ Names below are loaded when they are first used: importing mpgrasp loads neither
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+import lazy_loader
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "CameraIntrinsics": "depth",
-    "DepthFrame": "depth",
-    "DepthNoise": "sensor_noise",
-    "Grasp": "grasp",
-    "GraspMap": "grasp",
-    "HeightMap": "height_map",
-    "GridMap": "grid_map",
-    "GraspDetector": "detectors.detector",
-    "make_detector": "detectors",
-    "Command": "controllers.controller",
-    "Controller": "controllers.controller",
-    "Observation": "controllers.controller",
-    "make_controller": "controllers",
-    "SceneConfig": "scene",
-    "build_scene": "scene",
-    "Simulation": "simulation",
-    "WristCamera": "camera",
-    "EpisodeConfig": "episode",
-    "run_episode": "episode",
-    "EpisodeResult": "episode_result",
-    "Outcome": "episode_result",
-    "MpgraspError": "exceptions",
-}
-
-__all__ = ["__version__", *_HOMES]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mpgrasp' has no attribute {name!r}")
-    return getattr(import_module(f"mpgrasp.{_HOMES[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ += ["__version__"]

@@ -1,8 +1,8 @@
 """The reach as a gymnasium environment: a policy steers the wrist camera, MP-PC's rule picks the grasp.
 
 Importing this module registers `mpgrasp/Grasp-v0`: `gymnasium.make("mpgrasp.env:mpgrasp/Grasp-v0")`.
-World, noise, arm and verdict are those of `mpgrasp.episode`: with MP-PC's own actions an episode ends as in
-the benchmark. Reference: https://gymnasium.farama.org/api/env/
+World, noise, arm and verdict are those of `mpgrasp.episode`: with MP-PC's own actions an episode ends as
+in the benchmark. Reference: https://gymnasium.farama.org/api/env/
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
-from mpgrasp.bench.plugins import load_detector
-from mpgrasp.bench.suite import Suite, episode_seed, load_suite
+from mpgrasp.camera.rasteriser import FAR
 from mpgrasp.controllers.config import MppcConfig
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.episode import Episode, EpisodeConfig, controller_seed
+from mpgrasp.episode.episode import Episode, EpisodeConfig, controller_seed
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.film import Watcher
 from mpgrasp.grasp import GraspMap
-from mpgrasp.rasteriser import FAR
+from mpgrasp.plugins import load_detector
+from mpgrasp.recording.watcher import Watcher
+from mpgrasp.suite import Suite, episode_seed, load_suite
 
 ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
 """What an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds, though

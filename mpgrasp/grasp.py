@@ -242,3 +242,10 @@ def peaks(
         apart[0] = False
         candidates = candidates[apart]
     return np.array(chosen, np.intp).reshape(-1, 2)
+
+
+def peak_height(quality: FloatArray) -> float:
+    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
+    finite = quality if np.isfinite(quality).all() else np.nan_to_num(quality)
+    image = finite.astype(np.float32, copy=False)
+    return float(cv2.blur(image, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

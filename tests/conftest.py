@@ -1,8 +1,16 @@
-"""The studies in benchmarks/ are scripts beside each other: tests import them as these do one another."""
+"""Fixtures that tests of several rooms share."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+import fakes
+import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+
+@pytest.fixture
+def fake_world(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Episodes and world card that take no time."""
+    monkeypatch.setattr("mpgrasp.episode.episode.run_episode", fakes.run_episode)
+    monkeypatch.setattr(
+        "mpgrasp.bench.playing.world_card.world_card", lambda *_: {"physics": {}, "camera": {}}
+    )
+    return monkeypatch

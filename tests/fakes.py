@@ -78,7 +78,7 @@ class FakeResult:
 
 
 def _seed(episode: int) -> int:
-    from mpgrasp.bench.suite import episode_seed
+    from mpgrasp.suite import episode_seed
 
     return episode_seed("thin", 0, episode)
 

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from mpgrasp import scene_file, show
 from mpgrasp.bench import __main__ as bench
 from mpgrasp.command_line import Parser, run_command
 from mpgrasp.detectors.__main__ import make_parser
 from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.inspection import show
+from mpgrasp.scene import __main__ as scene_command
 from mpgrasp.training import __main__ as training
 
 
@@ -22,7 +23,7 @@ from mpgrasp.training import __main__ as training
         (training.main, ["generate", "--out", "a"]),
         (training.main, ["train", "dhrnet", "--data", "a"]),
         (lambda words: show.main(make_parser(), words), ["show", "dhrnet"]),
-        (scene_file.main, ["thin"]),
+        (scene_command.main, ["thin"]),
     ],
 )
 def test_every_command_refuses_an_unknown_option_in_the_same_words(

@@ -12,15 +12,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from mpgrasp.bench.suite import episode_seed, load_suite
 from mpgrasp.controllers import make_controller
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
 from mpgrasp.detectors import make_detector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
-from mpgrasp.episode import EpisodeConfig, run_episode
+from mpgrasp.episode.episode import EpisodeConfig, run_episode
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
+from mpgrasp.suite import episode_seed, load_suite
 
 STILL = np.zeros(4)
 DOWN = np.array([0.0, 0.0, -1.0, 0.0])

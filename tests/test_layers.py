@@ -1,4 +1,4 @@
-"""The house rule: imports go one way."""
+"""The rule of the house: imports go one way, from room to room and inside a room."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import ast
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -14,144 +16,205 @@ import mpgrasp
 
 PACKAGE = Path(mpgrasp.__file__).parent
 
-PERCEPTION, WORLD = "perception", "world"
-ROWS: dict[str, tuple[int, str]] = {
-    **dict.fromkeys(
-        ["exceptions", "paths", "geometry", "plain", "replace_file", "result_cache", "command_line"], (1, "")
-    ),
-    **dict.fromkeys(["depth", "sensor_noise", "height_map", "grasp", "false_colour"], (2, "")),
-    **dict.fromkeys(["detectors", "grid_map", "entropy"], (3, PERCEPTION)),
-    **dict.fromkeys(
-        ["object_model", "objects", "mesh_objects", "mesh_surface", "terrain", "settling", "scene"],
-        (3, WORLD),
-    ),
-    **dict.fromkeys(
-        [
-            "panda",
-            "contacts",
-            "gripper_drive",
-            "free_gripper",
-            "simulation",
-            "rasteriser",
-            "ray_caster",
-            "height_field_rays",
-            "convex_rays",
-            "camera",
-            "ik",
-            "reflex",
-            "motion",
-            "pacing",
-            "trajectory",
-        ],
-        (3, WORLD),
-    ),
-    "controllers": (4, ""),
-    **dict.fromkeys(["film", "rerun_model", "rerun_recorder"], (5, "")),
-    **dict.fromkeys(
-        [
-            "driver",
-            "execution",
-            "execution_config",
-            "lift_trial",
-            "clearing",
-            "episode",
-            "episode_config",
-            "episode_metrics",
-            "episode_result",
-            "recording",
-        ],
-        (5, ""),
-    ),
-    **dict.fromkeys(["scene_file", "env", "bench", "training", "show", "runtime_check"], (6, "")),
-}
-FORBIDDEN = {
-    PERCEPTION: {"mujoco", "mink"},
-    WORLD: {"torch"},
-    "controllers": {"mujoco", "mink", "torch"},
-}
+ORDER = (
+    "exceptions", "geometry", "paths", "outcome", "workspace",
+    "files", "command_line", "statistics",
+    "depth", "height_map", "grasp",
+    "robot", "camera",
+    "scene.objects", "scene",
+    "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
+    "controllers", "motion", "recording", "episode",
+    "suite", "plugins", "env", "inspection",
+    "training.data", "training",
+    "bench.record", "bench.processes", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
+    "bench.playing", "bench.commands", "bench",
+)  # fmt: skip
+"""Rooms of the house from the ground up: each may import what stands before it."""
+
+NO_MUJOCO = ("detectors", "controllers")
+NO_TORCH = ("robot", "camera", "scene", "motion", "controllers", "recording")
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 
-def unit(module: str) -> str:
-    """`mpgrasp.detectors.oracle` belongs to `detectors`; `mpgrasp` itself to the empty name."""
-    return [*module.split("."), ""][1]
+class Import(NamedTuple):
+    """One import of a module of this project."""
+
+    line: int
+    module: str
+    runs_on_import: bool
+    """Not inside of a function."""
 
 
-def module_name(path: Path) -> str:
+def name_of(path: Path) -> str:
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports(path: Path) -> list[tuple[str, bool]]:
-    """(module, runs when the file is imported) of every import, those for type checkers left out."""
-    found: list[tuple[str, bool]] = []
+MODULES = {name_of(path) for path in SOURCES}
 
-    def walk(node: ast.AST, at_import: bool) -> None:
-        if isinstance(node, ast.If) and "__main__" in ast.dump(node.test):
-            return  # a command at a module's foot may use whatever it likes
+
+def room(module: str) -> str:
+    """The longest name of `ORDER` that a module lies in; empty for `mpgrasp` itself."""
+    words = module.split(".")[1:]
+    names = (".".join(words[:k]) for k in range(len(words), 0, -1))
+    return next((name for name in names if name in ORDER), "")
+
+
+def is_command(module: str) -> bool:
+    """Whether a module is what `python -m` runs: the door of a room, which nobody comes in by."""
+    return module.endswith(".__main__")
+
+
+def imports(path: Path) -> Iterator[Import]:
+    """Every import, those of `if __name__ == "__main__"` blocks too, those for type checkers left out."""
+
+    def walk(node: ast.AST, at_import: bool) -> Iterator[Import]:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             for otherwise in node.orelse:
-                walk(otherwise, at_import)
+                yield from walk(otherwise, at_import)
             return
         if isinstance(node, ast.Import):
-            found.extend((alias.name, at_import) for alias in node.names)
+            yield from (Import(node.lineno, alias.name, at_import) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            # `from mpgrasp import episode` names the module in its aliases
-            names = [f"mpgrasp.{a.name}" for a in node.names] if node.module == "mpgrasp" else [node.module]
-            found.extend((name, at_import) for name in names)
+            for alias in node.names:  # `from mpgrasp.scene import export` names a module in its alias
+                inner = f"{node.module}.{alias.name}"
+                yield Import(node.lineno, inner if inner in MODULES else node.module, at_import)
         inside = at_import and not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
         for child in ast.iter_child_nodes(node):
-            walk(child, inside)
+            yield from walk(child, inside)
 
-    walk(ast.parse(path.read_text()), True)
-    return found
+    yield from walk(ast.parse(path.read_text()), True)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_go_to_the_same_or_an_earlier_row(path: Path) -> None:
-    here = unit(module_name(path))
-    if not here:
+def ours(path: Path) -> list[Import]:
+    return [found for found in imports(path) if found.module.split(".")[0] == "mpgrasp"]
+
+
+EVERY_MODULE = pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+
+
+@EVERY_MODULE
+def test_every_module_has_a_room(path: Path) -> None:
+    assert name_of(path) == "mpgrasp" or room(name_of(path)), "give it a place in ORDER and in the design"
+
+
+@EVERY_MODULE
+def test_imports_go_to_the_same_or_an_earlier_room(path: Path) -> None:
+    if is_command(name_of(path)):
+        return  # a door stands at the top of the house; nobody may import it, as the next test says
+    here = room(name_of(path))
+    for line, module, _ in ours(path):
+        there = room(module)
+        if there:
+            assert ORDER.index(there) <= ORDER.index(here), f"line {line}: {here} imports {there}"
+
+
+@EVERY_MODULE
+def test_nobody_imports_a_command(path: Path) -> None:
+    doors = [(line, module) for line, module, _ in ours(path) if is_command(module)]
+    assert not doors
+
+
+@EVERY_MODULE
+def test_nothing_outside_of_the_benchmark_imports_it(path: Path) -> None:
+    if room(name_of(path)).startswith("bench"):
         return
-    assert here in ROWS, f"{here} has no row: give it one here and in the design"
-    row, half = ROWS[here]
-    for target, _ in imports(path):
-        there = unit(target) if target.split(".")[0] == "mpgrasp" else ""
-        if not there or there not in ROWS:
-            continue
-        their_row, their_half = ROWS[there]
-        assert their_row <= row, f"{here} (row {row}) imports {there} (row {their_row})"
-        blind = row == their_row == 3 and half != their_half
-        assert not blind, f"{here} and {there} are in the two halves that do not know each other"
+    assert not [found for found in ours(path) if found.module.startswith("mpgrasp.bench")]
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """Some circle of a graph, in order; empty if there is none."""
+    done: set[str] = set()
+
+    def visit(node: str, way: list[str]) -> list[str]:
+        if node in way:
+            return [*way[way.index(node) :], node]
+        if node in done:
+            return []
+        for target in sorted(graph.get(node, ())):
+            if found := visit(target, [*way, node]):
+                return found
+        done.add(node)
+        return []
+
+    return next((found for node in sorted(graph) if (found := visit(node, []))), [])
+
+
+def test_no_module_imports_itself_by_a_way_around() -> None:
+    """Imports inside of functions count: a circle that is put off is a circle."""
+    graph = {name_of(path): {found.module for found in ours(path)} & MODULES for path in SOURCES}
+    # the package itself hands on names lazily; what imports it for them stands in no circle of work
+    assert circle({name: targets - {"mpgrasp"} for name, targets in graph.items()}) == []
+
+
+def test_a_circle_would_be_found() -> None:
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c", "a"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
+def used(path: Path) -> set[str]:
+    return {found.module.split(".")[0] for found in imports(path)}
+
+
+@EVERY_MODULE
 def test_perception_knows_no_mujoco_the_world_no_torch_and_controllers_neither(path: Path) -> None:
-    here = unit(module_name(path))
-    banned = FORBIDDEN.get(here) or FORBIDDEN.get(ROWS.get(here, (0, ""))[1], set())
-    used = {target.split(".")[0] for target, _ in imports(path)}
-    assert not used & banned, f"{here} must not import {used & banned}"
+    if is_command(name_of(path)):
+        return
+    here = room(name_of(path)).split(".")[0]
+    banned = {"mujoco", "mink"} if here in NO_MUJOCO else set()
+    banned |= {"torch"} if here in NO_TORCH else set()
+    assert not used(path) & banned
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+@EVERY_MODULE
 def test_imports_are_absolute(path: Path) -> None:
     relative = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom) and n.level]
     assert not relative
 
 
-@pytest.mark.parametrize(
-    ("module", "heavy"),
-    [
-        ("mpgrasp", ("torch", "mujoco", "rerun", "OpenGL")),
-        ("mpgrasp.detectors", ("torch", "mujoco", "rerun", "OpenGL")),
-        ("mpgrasp.controllers", ("torch", "mujoco", "rerun", "OpenGL")),
-        ("mpgrasp.controllers.mppc", ("torch", "mujoco", "rerun", "OpenGL")),
-        ("mpgrasp.bench", ("torch", "OpenGL")),
-        ("mpgrasp.env", ("torch", "rerun", "OpenGL")),
-    ],
-)
-def test_importing_a_registry_loads_nothing_heavy(module: str, heavy: tuple[str, ...]) -> None:
-    code = f"import sys, {module}; print([m for m in {heavy} if m in sys.modules])"
+HEAVY = ("torch", "mujoco", "rerun", "OpenGL")
+
+
+def loaded(code: str, *arguments: str) -> list[str]:
+    """Which of `HEAVY` some code has loaded at its end."""
+    report = f"import atexit, sys; atexit.register(lambda: print([m for m in {HEAVY} if m in sys.modules]))"
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    command = [sys.executable, "-c", f"{report}\n{code}", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "[]"
+    names: list[str] = ast.literal_eval(done.stdout.splitlines()[-1])
+    return names
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["mpgrasp", "mpgrasp.detectors", "mpgrasp.controllers", "mpgrasp.controllers.mppc", "mpgrasp.scene",
+     "mpgrasp.camera", "mpgrasp.motion", "mpgrasp.episode", "mpgrasp.suite", "mpgrasp.plugins",
+     "mpgrasp.bench"],
+)  # fmt: skip
+def test_importing_a_room_loads_nothing_heavy(module: str) -> None:
+    assert loaded(f"import {module}") == []
+
+
+def test_importing_the_environment_loads_no_torch() -> None:
+    assert "torch" not in loaded("import mpgrasp.env")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "report", "--help"),
+     ("detectors", "--help")],
+)  # fmt: skip
+def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
+    module = f"mpgrasp.{words[0]}"
+    code = f"import runpy, sys; sys.argv = {list(words)}; runpy.run_module({module!r}, run_name='__main__')"
+    assert loaded(code) == []
+
+
+@pytest.mark.parametrize("package", sorted(path.parent for path in PACKAGE.rglob("__init__.pyi")))
+def test_every_name_that_a_package_hands_on_is_there(package: Path) -> None:
+    name = ".".join(package.relative_to(PACKAGE.parent).parts)
+    module = __import__(name, fromlist=["*"])
+    assert module.__all__
+    for attribute in module.__all__:
+        assert getattr(module, attribute) is not None

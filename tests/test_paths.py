@@ -40,7 +40,7 @@ def test_a_wheel_carries_all_that_the_checkout_offers(tmp_path: Path) -> None:
         [
             sys.executable,
             "-c",
-            "from mpgrasp.bench.suite import suite_names as s; from mpgrasp.paths import *;"
+            "from mpgrasp.suite import suite_names as s; from mpgrasp.paths import *;"
             "print(DATA_ROOT, *s(), sep='|')",
         ],
         cwd=tmp_path / "site",

@@ -18,18 +18,17 @@ import numpy as np
 import pytest
 
 from mpgrasp.bench.__main__ import SUBCOMMANDS
-from mpgrasp.bench.plan import CAMERA_BACKENDS
-from mpgrasp.bench.plugins import controller_names, detector_names
-from mpgrasp.bench.programme import PROGRAMMES
-from mpgrasp.bench.suite import suite_names
-from mpgrasp.bench.summary import paired_tests, summarise
-from mpgrasp.camera import D435_INTRINSICS
+from mpgrasp.bench.analysis.summary import paired_tests, summarise
+from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
+from mpgrasp.bench.playing.programme import PROGRAMMES
+from mpgrasp.camera.wrist_camera import D435_INTRINSICS
 from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors import RUNTIMES
-from mpgrasp.detectors.networks import NETWORKS
+from mpgrasp.detectors.networks.registry import NETWORKS, RUNTIMES
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.files.json_values import plain
 from mpgrasp.geometry import looking_down
-from mpgrasp.plain import plain
+from mpgrasp.plugins import controller_names, detector_names
+from mpgrasp.suite import suite_names
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -9,10 +9,10 @@ from statistics import mean
 from typing import Any
 
 import pytest
+from mpgrasp.bench.record import by_cell
 from scipy.stats import wilcoxon
 
-from mpgrasp.bench.hypotheses import Verdict, count_verdicts, evaluate
-from mpgrasp.bench.summary import by_cell
+from mpgrasp.bench.analysis.hypotheses import Verdict, count_verdicts, evaluate
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"

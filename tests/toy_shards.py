@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from mpgrasp.geometry import looking_down
-from mpgrasp.training.labels import encode_angle, encode_depth
-from mpgrasp.training.shards import FORMAT
+from mpgrasp.training.data.labels import encode_angle, encode_depth
+from mpgrasp.training.data.shards import FORMAT
 
 DIRECTIONS = (0.4, -1.1)
 """Closing directions, an odd angle and the one at right angles to it, nearly [rad]."""

@@ -18,8 +18,8 @@ import toys
 from scipy.spatial import ConvexHull
 from shapes import Declared
 
-from mpgrasp.object_model import ObjectModel, Part
-from mpgrasp.objects import OBJECT_SETS
+from mpgrasp.scene.objects.catalogue import OBJECT_SETS
+from mpgrasp.scene.objects.model import ObjectModel, Part
 
 HERE = Path(__file__).resolve().parent
 

@@ -8,8 +8,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
 
-from mpgrasp.object_model import Part
-from mpgrasp.objects import convex_pieces
+from mpgrasp.scene.objects.from_mesh import convex_pieces
+from mpgrasp.scene.objects.model import Part
 
 MM = 1e-3
 WHOLE = 12

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mpgrasp.entropy import Border
+from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, GridConfig
+from mpgrasp.controllers.information import Border
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.grid_map import EXTENT_PUBLISHED, GridConfig
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.controllers.reaching import ReachingController
 from mpgrasp.grasp import Grasp, GraspMap, best_pixel
-from mpgrasp.grid_map import GridMap
 
 
 class Mppc(ReachingController):

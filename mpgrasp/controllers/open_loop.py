@@ -6,11 +6,10 @@ import numpy as np
 
 from mpgrasp.controllers.config import MppcConfig
 from mpgrasp.controllers.controller import Command, Observation
+from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.controllers.mppc import best_grasp_in_view
-from mpgrasp.controllers.reaching import peak_height
 from mpgrasp.geometry import FloatArray
-from mpgrasp.grasp import Grasp
-from mpgrasp.grid_map import GridMap
+from mpgrasp.grasp import Grasp, peak_height
 
 
 class OpenLoop:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.controllers.config import MppcConfig
 from mpgrasp.controllers.controller import Command, Observation
-from mpgrasp.entropy import exploration_cost, grid_entropy, information_gain, utility
+from mpgrasp.controllers.grid_map import GridMap
+from mpgrasp.controllers.information import exploration_cost, grid_entropy, information_gain, utility
 from mpgrasp.geometry import FloatArray, wrap_half_pi, wrap_pi
-from mpgrasp.grasp import Grasp, GraspMap
-from mpgrasp.grid_map import GridMap
+from mpgrasp.grasp import Grasp, GraspMap, peak_height
 
 _TIE = 1e-3
 """Utilities closer to the best than this fraction of the range in the window are equally good."""
@@ -129,10 +128,3 @@ class ReachingController(ABC):
         # within the slack the hand waits at the end of its range; the grasp itself turns the rest
         goal = float(np.clip(goal, -c.yaw_range, c.yaw_range))
         return float(np.clip(c.yaw_gain * (goal - yaw), -c.yaw_rate_max, c.yaw_rate_max))
-
-
-def peak_height(quality: FloatArray) -> float:
-    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
-    finite = quality if np.isfinite(quality).all() else np.nan_to_num(quality)
-    image = finite.astype(np.float32, copy=False)
-    return float(cv2.blur(image, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

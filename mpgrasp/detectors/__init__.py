@@ -11,12 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.detectors.networks.registry import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 
 __all__ = ["DETECTORS", "RUNTIMES", "GraspDetector", "make_detector"]
 
-RUNTIMES = ("auto", "torch", "openvino")
-"""What can compute a network; see `mpgrasp.detectors.runtime`."""
 
 _Maker = Callable[[Path | str | None, str], GraspDetector]
 

@@ -1,6 +1,6 @@
 """`python -m mpgrasp.detectors show|check|card`: what detectors see, how exact they are, what made them.
 
-What is done with the options is in `mpgrasp.show`: this package knows nothing of the world.
+What is done with the options is in `mpgrasp.inspection.show`: this package knows nothing of the world.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from mpgrasp.command_line import Parser
-from mpgrasp.detectors import RUNTIMES
+from mpgrasp.detectors.networks.registry import RUNTIMES
 
 _RUNTIMES = "|".join(RUNTIMES)
 _EPILOG = """\
@@ -75,6 +75,6 @@ def make_parser() -> argparse.ArgumentParser:
 if __name__ == "__main__":
     import sys
 
-    from mpgrasp.show import main
+    from mpgrasp.inspection.show import main
 
     sys.exit(main(make_parser()))

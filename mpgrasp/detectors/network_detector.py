@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.depth import CROP, DepthFrame, inpaint
-from mpgrasp.detectors.runtime import Runtime, make_runtime, runtime_name
-from mpgrasp.detectors.view import empty_map, says_something, square_view
-from mpgrasp.detectors.weights import NetworkWeights, default_weights, load_weights
+from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
+from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
+from mpgrasp.detectors.square_view import empty_map, says_something, square_view
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from mpgrasp.depth import DepthFrame, inpaint
-from mpgrasp.detectors.antipodal import HandGeometry, WorldGrasps, antipodal_grasps
-from mpgrasp.detectors.view import empty_map, says_something, square_view
+from mpgrasp.detectors.antipodal.analysis import HandGeometry, WorldGrasps, antipodal_grasps
+from mpgrasp.detectors.square_view import empty_map, says_something, square_view
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, world_to_image_angle

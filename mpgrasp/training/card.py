@@ -2,39 +2,62 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import torch
 
+from mpgrasp.training.trainer_config import TrainConfig
 from mpgrasp.training.validation import SELECT_BY
-
-if TYPE_CHECKING:
-    from mpgrasp.training.trainer import Trainer
 
 LICENCE = "Apache-2.0"
 
 
-def training_card(run: Trainer) -> dict[str, Any]:
-    """Command, data with their verification, seed, steps, time, settings, metrics, licence."""
-    config = run.config
-    return {
-        "command": run.command,
-        "data": run.dataset.description(),
-        "validation_data": run.validation.description(),
-        "training_images": len(run.dataset.training),
-        "training_scenes": run.dataset.scene_count,
-        "images_seen": run.step * config.batch,
-        "steps": run.step,
-        "minutes": round(run.elapsed / 60, 1),
-        "device": run.device.type,
-        "threads": torch.get_num_threads(),
-        "torch": torch.__version__,
-        "seed": config.seed,
-        "parameters": run.parameters,
-        "optimiser": f"AdamW, lr {config.lr:g} {config.schedule}, weight decay {config.weight_decay:g}",
-        "config": {k: v for k, v in asdict(config).items() if k not in ("name", "settings", "input")},
-        "selected_by": SELECT_BY,
-        "validation": {k: round(v, 4) for k, v in run.best.items()},
-        "licence": LICENCE,
-    }
+@dataclass(frozen=True, kw_only=True)
+class TrainingRecord:
+    """What there is to say of a training, whoever did it."""
+
+    command: str
+    """That can be typed to do it again."""
+    config: TrainConfig
+    data: Sequence[Mapping[str, Any]]
+    """Descriptions of the data sets."""
+    validation_data: Sequence[Mapping[str, Any]]
+    """Descriptions of the data sets that chose the weights."""
+    training_images: int
+    training_scenes: int
+    steps: int
+    """Steps of the optimiser."""
+    elapsed: float
+    """Wall-clock time [s]."""
+    device: str
+    """cpu or cuda."""
+    parameters: int
+    """Of the network."""
+    best: Mapping[str, float]
+    """Validation figures of the weights that were kept."""
+
+    def card(self) -> dict[str, Any]:
+        """Command, data with their verification, seed, steps, time, settings, metrics, licence."""
+        config = self.config
+        return {
+            "command": self.command,
+            "data": self.data,
+            "validation_data": self.validation_data,
+            "training_images": self.training_images,
+            "training_scenes": self.training_scenes,
+            "images_seen": self.steps * config.batch,
+            "steps": self.steps,
+            "minutes": round(self.elapsed / 60, 1),
+            "device": self.device,
+            "threads": torch.get_num_threads(),
+            "torch": torch.__version__,
+            "seed": config.seed,
+            "parameters": self.parameters,
+            "optimiser": f"AdamW, lr {config.lr:g} {config.schedule}, weight decay {config.weight_decay:g}",
+            "config": {k: v for k, v in asdict(config).items() if k not in ("name", "settings", "input")},
+            "selected_by": SELECT_BY,
+            "validation": {k: round(v, 4) for k, v in self.best.items()},
+            "licence": LICENCE,
+        }

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.depth import inpaint
-from mpgrasp.detectors.network_input import NetworkInput
+from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation, Sample, augment
-from mpgrasp.training.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
-from mpgrasp.training.shards import FORMAT
+from mpgrasp.training.data.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
+from mpgrasp.training.data.shards import FORMAT
 
 SCENE_COLUMN = "scene"
 """Images of one scene are either all held out or none."""

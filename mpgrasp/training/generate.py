@@ -20,11 +20,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from mpgrasp.camera import BACKENDS
+from mpgrasp.camera.wrist_camera import BACKENDS
 from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError
-from mpgrasp.training import shards
-from mpgrasp.training.generate_config import GenerateConfig
-from mpgrasp.training.views import make_scene, make_views
+from mpgrasp.training.data import shards
+from mpgrasp.training.data.generate_config import GenerateConfig
+from mpgrasp.training.data.views import make_scene, make_views
 
 __all__ = ["GenerateConfig", "add_arguments", "generate", "main", "make_scene", "make_views"]
 
@@ -88,8 +88,8 @@ def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: b
         alone = workers == 1 or len(waiting) < 2
         for _ in map(_write_shard, waiting) if alone else _written_by_workers(waiting, workers):
             bar.advance(task)
-    from mpgrasp.training.data_card import write_data_card
-    from mpgrasp.training.sheet import write_sheet
+    from mpgrasp.training.data.data_card import write_data_card
+    from mpgrasp.training.data.sheet import write_sheet
 
     write_data_card(config, paths, out / "README.md")
     write_sheet(paths[0], out / "sheet.png")
@@ -97,7 +97,7 @@ def generate(config: GenerateConfig, out: Path, *, workers: int = 1, progress: b
 
 
 def _require_colour() -> None:
-    from mpgrasp.rasteriser import require_gl
+    from mpgrasp.camera.rasteriser import require_gl
 
     try:
         require_gl()

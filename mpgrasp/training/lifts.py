@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, best_pixel
-from mpgrasp.lift_trial import LiftRig
+from mpgrasp.motion.lift_trial import LiftRig
 from mpgrasp.training.augmentation import Sample
+from mpgrasp.training.data.views import make_scene, stored_intrinsics, stored_pose
 from mpgrasp.training.dataset import GraspDataset
-from mpgrasp.training.views import make_scene, stored_intrinsics, stored_pose
 
 
 class LiftCheck:

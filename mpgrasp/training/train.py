@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.network_input import CHANNELS, NetworkInput
-from mpgrasp.detectors.networks import INPUT_SIZE
+from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
+from mpgrasp.detectors.networks.registry import INPUT_SIZE
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.trainer_config import TRAINABLE, TrainConfig
 

@@ -21,11 +21,11 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from mpgrasp.detectors.networks import build_network
-from mpgrasp.detectors.weights import NetworkWeights, save_weights, width_unit
+from mpgrasp.detectors.networks.registry import build_network
+from mpgrasp.detectors.networks.weights import NetworkWeights, save_weights, width_unit
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.training.batches import Batches
-from mpgrasp.training.card import training_card
+from mpgrasp.training.card import TrainingRecord
 from mpgrasp.training.checkpoint import read_checkpoint, write_checkpoint
 from mpgrasp.training.curves import write_curves
 from mpgrasp.training.dataset import GraspDataset
@@ -245,8 +245,23 @@ class Trainer:
 
     def save(self) -> None:
         """Write the averaged weights with their training card."""
-        weights = dataclasses.replace(self.weights, card=training_card(self))
+        weights = dataclasses.replace(self.weights, card=self._record().card())
         save_weights(self.out, weights, self.average)
+
+    def _record(self) -> TrainingRecord:
+        return TrainingRecord(
+            command=self.command,
+            config=self.config,
+            data=self.dataset.description(),
+            validation_data=self.validation.description(),
+            training_images=len(self.dataset.training),
+            training_scenes=self.dataset.scene_count,
+            steps=self.step,
+            elapsed=self.elapsed,
+            device=self.device.type,
+            parameters=self.parameters,
+            best=self.best,
+        )
 
     def save_checkpoint(self) -> None:
         """Write everything that a later `resume` needs.

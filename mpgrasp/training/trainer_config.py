@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mpgrasp.detectors.network_input import NetworkInput
-from mpgrasp.detectors.networks import NETWORKS
+from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.networks.registry import NETWORKS
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation
 

@@ -1,0 +1,136 @@
+"""The paper's orderings as hypotheses: tested in pairs over common worlds, and a verdict for each.
+
+Rates (success, reflex stops) by McNemar's exact test, times and distances by Wilcoxon's signed-rank test;
+all two-sided, and corrected after Holm over all that could be decided. A claim over too few worlds for any p
+below the level of significance is no test, and left out (Tarone, Biometrics 46, 1990).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from mpgrasp.bench.analysis.pairing import pair_worlds
+from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Claim, Measure
+from mpgrasp.bench.analysis.summary import restricted_time, time_limits
+from mpgrasp.bench.record import Cells
+from mpgrasp.statistics import FEWEST_PAIRS, SIGNIFICANCE, holm, mcnemar, wilcoxon
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    CONFIRMED = "confirmed"
+    """Significant, in the direction that the paper claims."""
+    NOT_CONFIRMED = "not confirmed"
+    CONTRADICTED = "contradicted"
+    """Significant, in the other direction."""
+    UNDECIDABLE = "cannot be decided"
+    """Over so few worlds that it could not be significant, whatever came out."""
+    ABSENT = "not tested"
+    """Cells or measurements are absent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A claim, and what these runs have to say to it."""
+
+    claim: Claim
+    verdict: Verdict
+    n: int = 0
+    """Worlds that both cells met, with the measurement in both."""
+    better: float = np.nan
+    """Mean of the cell that is claimed to be better: a rate (0 to 1), seconds or metres."""
+    worse: float = np.nan
+    p: float = np.nan
+    p_holm: float = np.nan
+    """NaN where the claim cannot be decided."""
+    absent: str = ""
+    """What is missing, in words."""
+    agrees: bool = False
+    """Whether the difference has the direction claimed, significant or not."""
+
+
+def cell_of(cells: Cells, suite: str, method: str, controller: str) -> tuple[str, str, str] | None:
+    """The cell of a run that stands for the paper's (detector, controller); None if there is none.
+
+    One detector stands for a method throughout a suite: the first of its names that occurs there.
+    """
+    there = {detector for name, detector, _ in cells if name == suite}
+    for detector in METHODS[method]:
+        if detector in there:
+            cell = suite, detector, CONTROLLERS[controller]
+            return cell if cell in cells else None
+    return None
+
+
+def evaluate(cells: Cells, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:
+    """One finding per claim, in their order."""
+    findings = [_test(claim, cells) for claim in claims]
+    tested = [k for k, f in enumerate(findings) if f.verdict not in (Verdict.ABSENT, Verdict.UNDECIDABLE)]
+    for k, p in zip(tested, holm([findings[k].p for k in tested]), strict=True):
+        found, verdict = findings[k], Verdict.NOT_CONFIRMED
+        if p < SIGNIFICANCE:
+            verdict = Verdict.CONFIRMED if found.agrees else Verdict.CONTRADICTED
+        findings[k] = replace(found, p_holm=p, verdict=verdict)
+    return findings
+
+
+def _test(claim: Claim, cells: Cells) -> Finding:
+    keys = [cell_of(cells, claim.suite, *side) for side in (claim.better, claim.worse)]
+    missing = [
+        " + ".join(side) for side, key in zip((claim.better, claim.worse), keys, strict=True) if key is None
+    ]
+    if missing:
+        suite_there = any(suite == claim.suite for suite, _, _ in cells)
+        text = " and ".join(missing) if suite_there else f"suite {claim.suite}"
+        return Finding(claim=claim, verdict=Verdict.ABSENT, absent=f"{text} absent")
+    limit = time_limits(cells)[claim.suite]
+    sides = [[_with_value(line, claim.measure, limit) for line in cells[key]] for key in keys if key]
+    pairs = [
+        (one["value"], other["value"])
+        for one, other in pair_worlds(*sides)
+        if one["value"] is not None and other["value"] is not None
+    ]
+    if not pairs:
+        return Finding(claim=claim, verdict=Verdict.ABSENT, absent="no common episode with this measurement")
+    better, worse = np.array(pairs, float).T
+    higher = claim.measure is Measure.SUCCESS
+    gain = better - worse if higher else worse - better
+    if claim.measure in (Measure.SUCCESS, Measure.REFLEX):
+        p, agrees = mcnemar(int(np.sum(gain > 0)), int(np.sum(gain < 0))), gain.sum() > 0
+    else:
+        p, agrees = wilcoxon(gain)
+    return Finding(
+        claim=claim,
+        verdict=Verdict.UNDECIDABLE if len(pairs) < FEWEST_PAIRS else Verdict.NOT_CONFIRMED,
+        n=len(pairs),
+        better=float(better.mean()),
+        worse=float(worse.mean()),
+        p=p,
+        agrees=bool(agrees),
+    )
+
+
+def _with_value(line: Mapping[str, Any], measure: Measure, limit: float | None) -> dict[str, Any]:
+    value: float | None
+    match measure:
+        case Measure.SUCCESS:
+            value = line.get("success")
+        case Measure.REFLEX:
+            value = line.get("reflex") is not None
+        case Measure.TIME:
+            value = None if line.get("sim_time_s") is None else restricted_time(line, limit)
+        case Measure.DRIFT:
+            value = line.get("blind_drift_m")
+    return {**line, "value": value}
+
+
+def count_verdicts(findings: Iterable[Finding]) -> dict[Verdict, int]:
+    """Number of findings by verdict, all verdicts included."""
+    found = [finding.verdict for finding in findings]
+    return {verdict: found.count(verdict) for verdict in Verdict}

@@ -1,0 +1,1 @@
+"""The commands of `python -m mpgrasp.bench`: one verb, one module."""

@@ -1,0 +1,221 @@
+"""`python -m mpgrasp.bench compare A B`: is B worse than A over the worlds that both met?"""
+
+from __future__ import annotations
+
+import math
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from mpgrasp.bench.analysis.pairing import Pairing, pair, pair_worlds
+from mpgrasp.bench.analysis.summary import restricted_time
+from mpgrasp.bench.record import Cells
+from mpgrasp.bench.report.terminal import wide_console
+from mpgrasp.bench.results.cell_path import CellName, read_cells
+from mpgrasp.bench.results.reader import read_run
+from mpgrasp.command_line import Parser
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.files.json_values import Difference, difference
+from mpgrasp.statistics import SIGNIFICANCE, holm, restricted, wilcoxon
+
+EXIT_WORSE = 1
+_SHARED = ("seed", "camera", "noise")
+"""Parts of a configuration that two runs should agree in to be compared, beside their common suites."""
+
+_EPILOG = """\
+A and B are folders of runs, or single cells of them: RUN/DETECTOR/CONTROLLER. Cells of the same name are
+compared; where there is one on each side, it may have any name. Episodes are paired by suite, seed and
+number. Success: McNemar's exact test. Where tables are cleared, also the times, cut off at the limit, which
+is what a table that was not cleared counts as: Wilcoxon's signed-rank test. Both are two-sided, and p is
+corrected after Holm over all tests.
+
+exit code: 0 B is not worse, 1 B is: it succeeds less often or takes longer (p < 0.05), or has errors in
+episodes that A played; 2 unusable input.
+"""
+
+
+def make_parser() -> Parser:
+    """The command line's options."""
+    parser = Parser(
+        prog="python -m mpgrasp.bench compare",
+        description="Set two runs side by side, as a regression check.",
+        epilog=_EPILOG,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("a", metavar="A", help="the reference")
+    parser.add_argument("b", metavar="B", help="what is checked against it")
+    return parser
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeTest:
+    """How long two cells took to clear the same tables, cut off at the limit; who did not, took the limit."""
+
+    mean_a: float
+    """[s]"""
+    mean_b: float
+    """[s]"""
+    p: float
+    """Two-sided, of Wilcoxon's signed-rank test."""
+    slower: bool
+    """Whether B's times tend to be the longer ones, significantly or not."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A cell of A beside one of B."""
+
+    a: CellName
+    b: CellName
+    pairing: Pairing
+    times: TimeTest | None
+    """None unless both cleared tables."""
+    p_success: float = math.nan
+    """Of McNemar's test, after Holm's correction; NaN where there is no episode that both played."""
+    p_times: float = math.nan
+
+    @property
+    def differences(self) -> dict[str, bool]:
+        """What is to be said of B, and whether it makes B worse; empty if there is no difference."""
+        found = {}
+        if self.p_success < SIGNIFICANCE:
+            worse = self.pairing.rate_b < self.pairing.rate_a
+            found["B is worse" if worse else "B is better"] = worse
+        if self.times is not None and self.p_times < SIGNIFICANCE:
+            found["B is slower" if self.times.slower else "B is faster"] = self.times.slower
+        if self.pairing.lost:
+            found["B has errors"] = True
+        return found
+
+
+def unequal_conditions(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Difference]:
+    """Where two configurations differ in what decides the worlds and the episodes that both played."""
+    one, other = _suites(before), _suites(after)
+    found = [difference(before.get(key), after.get(key), key) for key in _SHARED]
+    found += [difference(one[name], other[name], name) for name in one if name in other]
+    return [changed for changed in found if changed]
+
+
+def _suites(configuration: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Declaration and settings by suite, of a run of one suite or of a programme of several."""
+    parts = configuration.get("suites") or [configuration]
+    return {part["suite"]["name"]: {key: part.get(key) for key in ("suite", "episode")} for part in parts}
+
+
+def compare(a: Cells, b: Cells) -> list[Comparison]:
+    """All cells in common, with p after Holm's correction over all tests of all of them.
+
+    Raises:
+        ConfigError: no cell or no episode in common.
+    """
+    if len(a) == len(b) == 1:
+        couples = [(next(iter(a)), next(iter(b)))]
+    else:
+        couples = [(name, name) for name in a if name in b]
+    rows = [
+        Comparison(a=CellName(*x), b=CellName(*y), pairing=pair(a[x], b[y]), times=compare_times(a[x], b[y]))
+        for x, y in couples
+    ]
+    rows = [row for row in rows if row.pairing.n or row.pairing.lost]
+    if not rows:
+        raise ConfigError(
+            "the runs have no episode in common",
+            got=[[f"{n.suite}/{n}" for n in map(CellName._make, cells)] for cells in (a, b)],
+            allowed="cells of the same names or one on each side, with the same suite and seed",
+        )
+    success = [row.pairing.p for row in rows if row.pairing.n]
+    corrected = holm([*success, *(row.times.p for row in rows if row.times)])
+    of_success, of_times = iter(corrected[: len(success)]), iter(corrected[len(success) :])
+    return [
+        replace(
+            row,
+            p_success=next(of_success) if row.pairing.n else math.nan,
+            p_times=next(of_times) if row.times else math.nan,
+        )
+        for row in rows
+    ]
+
+
+def compare_times(a: Sequence[Mapping[str, Any]], b: Sequence[Mapping[str, Any]]) -> TimeTest | None:
+    """Test the times of two cells over the tables that both had to clear; None if there are none."""
+    pairs = [(x, y) for x, y in pair_worlds(a, b) if "time_limit_s" in x and "time_limit_s" in y]
+    if not pairs:
+        return None
+    limit = min(line["time_limit_s"] for both in pairs for line in both)  # the same for A and B
+    times_a, times_b = (
+        restricted([restricted_time(line) for line in side], limit) for side in zip(*pairs, strict=True)
+    )
+    p, slower = wilcoxon(times_b - times_a)
+    return TimeTest(mean_a=float(times_a.mean()), mean_b=float(times_b.mean()), p=p, slower=slower)
+
+
+def main(command: Sequence[str]) -> int:
+    """Print the comparison and return the exit code.
+
+    Raises:
+        MpgraspError: input that cannot be used.
+    """
+    arguments = make_parser().parse_args(command)
+    (folder_a, a), (folder_b, b) = read_cells(arguments.a), read_cells(arguments.b)
+    rows = compare(a, b)
+    print(f"A = {folder_a}\nB = {folder_b}")
+    before, after = (read_run(folder)["configuration"] for folder in (folder_a, folder_b))
+    for changed in unequal_conditions(before, after):
+        print(f"Not the same in both: {changed.words('in A', 'in B')}")
+    for side, cells, shown in (("A", a, {row.a for row in rows}), ("B", b, {row.b for row in rows})):
+        alone = [f"{name.suite}/{name}" for name in map(CellName._make, cells) if name not in shown]
+        if alone:
+            print(f"In {side} alone, so not compared: {', '.join(alone)}")
+    wide_console().print(_table(rows))
+    lost = [(row.pairing.lost, row.pairing.lost + row.pairing.n, row.b) for row in rows if row.pairing.lost]
+    if lost:
+        text = ", ".join(f"{k} of {n} of {name.suite}/{name}" for k, n, name in lost)
+        print(f"B is worse: episodes that A played are errors in B: {text}")
+    return EXIT_WORSE if any(worse for row in rows for worse in row.differences.values()) else 0
+
+
+def _table(rows: Sequence[Comparison]) -> Table:
+    errors = any(row.pairing.errors_a or row.pairing.errors_b for row in rows)
+    times = any(row.times for row in rows)
+    table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
+    for heading in ("suite", "A", "B"):
+        table.add_column(heading, overflow="fold")
+    for heading in (
+        "n", *(["errors\nA, B"] if errors else []), "A %", "B %", "A alone", "B alone", "p",
+        "B - A, s\n(95 %)", *(["A, s", "B, s", "p of\ntimes"] if times else []),
+        "same\noutcome", "bit for\nbit",
+    ):  # fmt: skip
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict")
+    for row in rows:
+        found = row.pairing
+        table.add_row(
+            row.a.suite, str(row.a), str(row.b), str(found.n),
+            *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
+            _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
+            _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),
+            str(found.same_outcome), str(found.identical),
+            ", ".join(row.differences) or "no significant difference",
+        )  # fmt: skip
+    return table
+
+
+def _clearing(row: Comparison) -> list[str]:
+    if row.times is None:
+        return ["-"] * 3
+    return [_number(row.times.mean_a), _number(row.times.mean_b), _number(row.p_times, ".3g")]
+
+
+def _number(value: float, how: str = ".1f") -> str:
+    return "-" if math.isnan(value) else f"{value:{how}}"
+
+
+def _time(found: Pairing) -> str:
+    if math.isnan(found.time_difference_s):
+        return "-"
+    bounds = "" if math.isnan(found.time_low) else f" ({found.time_low:+.1f} to {found.time_high:+.1f})"
+    return f"{found.time_difference_s:+.1f}{bounds}"

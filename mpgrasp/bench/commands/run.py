@@ -1,0 +1,190 @@
+"""`python -m mpgrasp.bench SUITE ...`: options of the command that plays a suite."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from mpgrasp.command_line import Parser
+from mpgrasp.exceptions import ConfigError
+
+_EPILOG = """\
+examples:
+  python -m mpgrasp.bench thin
+  python -m mpgrasp.bench thin --detector dhrnet,ggcnn,oracle --controller mppc,mvp --episodes 100 --workers 2
+  python -m mpgrasp.bench unseen --detector my_net:MyDetector --weights my_net.pt --record 3
+  python -m mpgrasp.bench thin --episodes 50 --until-ci 10
+  python -m mpgrasp.bench paper --workers 2
+  python -m mpgrasp.bench paper --suites unseen,thin --episodes 100
+  python -m mpgrasp.bench --resume runs/thin-20260101-120000
+  python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
+  python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
+  python -m mpgrasp.bench report RUN                 (see report --help)
+
+Every detector and every controller meets the same scenes, sensor noise and start poses. The same
+command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
+process computes on one thread (set OMP_NUM_THREADS to change that).
+
+An episode whose process crashes, hangs or raises an error is played once more, and is then an error row,
+with its traceback in errors/: counted apart from failures. A run that was killed loses the episodes in
+hand; --resume plays those and the rest, and tries error rows again.
+
+exit code: 0 all episodes played, 1 some could not be played, 2 unusable input or output, 130 interrupted
+(Ctrl-C); finished episodes are kept in every case.
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
+    from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
+    from mpgrasp.bench.playing.programme import PROGRAMMES
+    from mpgrasp.bench.playing.workers import HANG_AFTER
+    from mpgrasp.detectors.networks.registry import RUNTIMES
+    from mpgrasp.plugins import controller_names, detector_names
+    from mpgrasp.suite import suite_names
+
+    parser = Parser(
+        prog="python -m mpgrasp.bench",
+        description="Closed-loop grasping in simulation: play a suite, print the table, write the results.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add(
+        "suite",
+        metavar="SUITE",
+        nargs="?",
+        help=f"{', '.join(suite_names())}, {', '.join(PROGRAMMES)} (all of Tables III to VI), or a path to a "
+        "declaration.toml; may be left out with --resume",
+    )
+    add("--suites", metavar="S[,S]", help="paper: play these of its suites alone (default: all)")
+    add(
+        "--detector",
+        metavar="D[,D]",
+        help=f"{', '.join(detector_names())}, or your own as module:Class (default: dhrnet; "
+        "paper: ggcnn2, tfgrasp and dhrnet, with references)",
+    )
+    add(
+        "--controller",
+        metavar="C[,C]",
+        help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc; "
+        "paper: mvp and mppc)",
+    )
+    add(
+        "--episodes",
+        metavar="N",
+        type=int,
+        help="episodes of each combination (default: what the suite declares, the paper's number)",
+    )
+    add(
+        "--until-ci",
+        metavar="W",
+        type=float,
+        help="go on in batches of N episodes until every 95 %% interval is narrower than W points "
+        "(stopping by the result makes intervals slightly too narrow)",
+    )
+    add(
+        "--max-episodes",
+        metavar="M",
+        type=int,
+        default=1000,
+        help="where --until-ci ends in any case (default: 1000)",
+    )
+    add(
+        "--objects",
+        metavar="MESH",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="single and unseen: meshes in metres in the place of the suite's objects, one per episode in "
+        "turn: OBJ, PLY and STL files, folders of them, or ycb for those scans of the YCB set that the hand "
+        "can close on however they lie (pip install mpgrasp[ycb])",
+    )
+    add(
+        "--density",
+        metavar="D",
+        type=float,
+        default=500.0,
+        help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
+    )
+    add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
+    add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
+    add(
+        "--resume",
+        metavar="DIR",
+        type=Path,
+        help="finish the run in DIR, by the command it was begun with; refused if anything has changed that "
+        "decides its results",
+    )
+    add(
+        "--record",
+        metavar="N",
+        type=int,
+        default=0,
+        help="record the first N episodes of each combination, for rerun and as GIF (default: 0)",
+    )
+    add(
+        "--weights",
+        metavar="[D=]FILE",
+        action="append",
+        default=[],
+        help="weights in place of those that ship with mpgrasp; D= says whose, and may be left out with "
+        "one detector; may be given several times",
+    )
+    add(
+        "--runtime",
+        metavar="|".join(RUNTIMES),
+        default="auto",
+        help="what computes the networks (default: auto, the fastest one here)",
+    )
+    add(
+        "--camera",
+        metavar="|".join(CAMERA_BACKENDS),
+        default="auto",
+        help="rasterised through OpenGL, ray-cast without it, or whichever is there (default: auto)",
+    )
+    add("--no-noise", action="store_true", help="a perfect depth camera")
+    add(
+        "--workers",
+        metavar="K",
+        type=int,
+        default=len(os.sched_getaffinity(0)),
+        help="play in K processes (default: one per core); 0 plays in this one, for debuggers",
+    )
+    add(
+        "--hang-after",
+        metavar="S",
+        type=float,
+        help="seconds after which an episode's process is taken for hung (default: "
+        f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
+    )
+    add("--quiet", action="store_true", help="no progress, only the table")
+    return parser
+
+
+def parse(command: Sequence[str]) -> argparse.Namespace:
+    """Arguments of a run, those of a resumed one taken from its run.json.
+
+    Raises:
+        ConfigError: unusable arguments, or a file of the resumed run that is not there any more.
+        OutputError: nothing to resume.
+    """
+    parser = make_parser()
+    arguments = parser.parse_args(command)
+    if arguments.resume is None:
+        if arguments.suite is None:
+            raise ConfigError(
+                "the following arguments are required: SUITE", allowed=f"see {parser.prog} --help"
+            )
+        return arguments
+    if arguments.out is not None:
+        raise ConfigError("--out beside --resume", got=str(arguments.out), allowed="one of both")
+    if arguments.suite is None:
+        from mpgrasp.bench.playing.recorded_command import recorded_arguments
+
+        arguments = recorded_arguments(arguments.resume, parser, command)
+    arguments.out = arguments.resume
+    return arguments

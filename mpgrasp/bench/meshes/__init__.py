@@ -1,0 +1,1 @@
+"""Meshes in the place of a suite's own objects."""

@@ -1,0 +1,140 @@
+"""Which meshes the benchmark can use: readable, of a plausible size, and within the hand's power.
+
+A mesh becomes an object (`scene.objects.from_mesh`), is dropped a number of times into the suite's own scene,
+and the analysis of antipodal grasps looks at the height map of every pose in which it comes to rest.
+Detectors and controllers have no say in it, and a scene that is played is never drawn again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+
+import mpgrasp
+from mpgrasp.bench.meshes.files import ObjectFile
+from mpgrasp.bench.results.provenance import sha256
+from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
+from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.exceptions import AssetError, ConfigError
+from mpgrasp.files.cache import load_result, store_result
+from mpgrasp.files.json_values import plain
+from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.objects.from_mesh import mesh_key, read_body
+from mpgrasp.scene.objects.model import ObjectModel
+from mpgrasp.scene.scene import build_scene
+
+REST_POSES = 8
+"""Number of times that an object is dropped, with the seeds 0, 1, 2, ..."""
+SOME_GRASP = 0.1
+"""Quality of the best grasp above which the hand can close on an object: no controller attempts less."""
+SURE_GRASP = 0.5
+"""The same where every pose must offer one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What came of one mesh."""
+
+    name: str
+    path: str
+    sha256: str | None
+    """Of the file; None where it cannot be read."""
+    reason: str | None = None
+    """Why it is not used; None if it is."""
+    model: ObjectModel | None = None
+    """The object, of what was accepted."""
+    qualities: tuple[float | None, ...] = ()
+    """Of the best grasp in each pose [0, 1]; None where the object did not come to rest."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the benchmark uses it."""
+        return self.model is not None
+
+    def card(self) -> Mapping[str, Any]:
+        """What run.json says of it."""
+        card: dict[str, Any] = {"name": self.name, "file": self.path, "sha256": self.sha256}
+        if self.model is None:
+            card["reason"] = self.reason
+        else:
+            card |= {"mass": self.model.mass, "size": self.model.size, "pieces": len(self.model.parts)}
+        return card | {"grasp_qualities": self.qualities}
+
+
+def examine(file: ObjectFile, scene: SceneConfig, density: float) -> Verdict:
+    """The verdict on one mesh; takes seconds unless it is cached.
+
+    Args:
+        file: where the mesh is.
+        scene: what it would lie in; its own objects do not matter.
+        density: [kg/m^3]
+    """
+    verdict = Verdict(name=file.name, path=str(file.path), sha256=sha256(file.path))
+    try:
+        body = read_body(file.path)
+        model = body.as_object(file.name, density=density, provenance=f"mesh file {file.path.name}")
+        qualities = _best_grasps(model, scene, _poses_key(body.key, scene, density))
+    except (AssetError, ConfigError) as error:
+        return replace(verdict, reason=str(error))
+    except ValueError as error:  # how MuJoCo's compiler complains
+        return replace(verdict, reason=f"MuJoCo cannot use it ({' '.join(str(error).split())})")
+    verdict = replace(verdict, qualities=qualities)
+    reason = _unfit(qualities, strict=file.strict)
+    return replace(verdict, reason=reason) if reason else replace(verdict, model=model)
+
+
+def is_cached(file: ObjectFile, scene: SceneConfig, density: float) -> bool:
+    """Whether `examine` has its answer at hand."""
+    try:
+        key = mesh_key(file.path)
+    except AssetError:
+        return True
+    mesh = load_result("meshes", key)
+    return mesh is not None and (
+        "refused" in mesh or load_result("rest_poses", _poses_key(key, scene, density)) is not None
+    )
+
+
+def _best_grasps(model: ObjectModel, scene: SceneConfig, key: str) -> tuple[float | None, ...]:
+    known = load_result("rest_poses", key)
+    if known is None:
+        config = replace(scene, objects=(model,), count=None)
+        known = {"qualities": [_best_grasp(config, seed) for seed in range(REST_POSES)]}
+        store_result("rest_poses", key, known)
+    return tuple(known["qualities"])
+
+
+def _best_grasp(config: SceneConfig, seed: int) -> float | None:
+    try:
+        settled = build_scene(config, seed, robot=False)
+    except ConfigError:  # it rolls, slides or rocks on
+        return None
+    return float(antipodal_grasps(settled.height_map()).quality.max())
+
+
+def _poses_key(mesh: str, scene: SceneConfig, density: float) -> str:
+    """Hash of all that decides in which poses a mesh comes to rest and what the hand can do there."""
+    decides = [
+        mesh, density, REST_POSES, replace(scene, objects=("it",), count=None), HandGeometry(),
+        mujoco.__version__, mpgrasp.__version__,
+    ]  # fmt: skip
+    return hashlib.sha256(json.dumps(plain(decides), sort_keys=True).encode()).hexdigest()
+
+
+def _unfit(qualities: tuple[float | None, ...], *, strict: bool) -> str | None:
+    """Why an object whose rest poses offer such grasps is not used."""
+    n = len(qualities)
+    if all(quality is None for quality in qualities):
+        return f"does not come to rest within the placing region; dropped {n} times"
+    best = [quality or 0.0 for quality in qualities]
+    if max(best) < SOME_GRASP:
+        return f"the hand cannot close on it in any of {n} rest poses"
+    good = sum(quality >= SURE_GRASP for quality in best)
+    if strict and good < n:
+        return f"a grasp of quality {SURE_GRASP:g} in only {good} of {n} rest poses, all are wanted"
+    return None

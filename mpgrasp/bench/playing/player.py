@@ -1,0 +1,139 @@
+"""Plays one episode of a plan at a time and says in a line what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from mpgrasp.bench.playing.plan import Plan
+from mpgrasp.bench.playing.trace_recorder import TraceRecorder
+from mpgrasp.bench.record import ERROR, Line, Task
+from mpgrasp.detectors.detector import prepare, reads_colour
+from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
+from mpgrasp.plugins import load_controller, load_detector
+from mpgrasp.recording.recorder import NullRecorder, Recorder
+from mpgrasp.suite import episode_seed
+
+RunEpisode = Callable[..., Any]
+"""Called like `mpgrasp.episode.episode.run_episode`; returns what has `as_record()`."""
+
+Games = RunEpisode | Mapping[str, RunEpisode]
+"""What plays an episode, for all trials or by trial."""
+
+
+class EpisodeError(MpgraspError):
+    """An episode that could not be played to its end, by a fault in a detector, controller or mpgrasp."""
+
+
+class Player:
+    """Plays episodes one at a time with detectors and controllers that are made once.
+
+    Raises:
+        ConfigError, WeightsError: a detector, controller or setting that cannot be used.
+    """
+
+    def __init__(self, plan: Plan, run_episode: Games | None = None) -> None:
+        self.plan = plan
+        self.detectors = {
+            name: load_detector(name, plan.weights.get(name), plan.runtime) for name in plan.detectors
+        }
+        self.controllers = {name: load_controller(name) for name in plan.controllers}
+        self.episode_configs = {
+            suite.name: suite.episode_config(camera=plan.camera, noise=plan.noise) for suite in plan.suites
+        }
+        self._run_episode = run_episode or real_games()
+
+    def prepare(self) -> list[str]:
+        """Have networks compiled now, once for all workers; a line for people of each that was.
+
+        Raises:
+            ConfigError: a detector reads colour, and the camera has none.
+        """
+        from mpgrasp.camera.wrist_camera import has_colour
+
+        for name, detector in self.detectors.items():
+            if reads_colour(detector) and not has_colour(self.plan.camera):
+                raise ConfigError(
+                    f"{name} reads colour, which takes OpenGL", got=f"camera {self.plan.camera}", allowed="gl"
+                )
+        return [line for line in map(prepare, self.detectors.values()) if line]
+
+    def play(self, task: Task) -> Line:
+        """The line of one episode, to go to episodes.jsonl.
+
+        Raises:
+            OutputError: its recording cannot be written.
+            EpisodeError: something else went wrong on the way; it is the cause.
+        """
+        suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
+        run_episode = games if callable(games) else games[suite.trial]
+        try:
+            result = run_episode(
+                suite.scene_config(task.episode),
+                episode_seed(suite.name, self.plan.seed, task.episode),
+                detector=self.detectors[task.detector],
+                controller=self.controllers[task.controller],
+                config=self.episode_configs[suite.name],
+                recorder=self._recorder(task, trace),
+            )
+            record = result.as_record()
+            if trace is not None:
+                trace.save(record)
+        except OutputError:
+            raise
+        except Exception as error:
+            raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
+        return {**record, **_which(self.plan, task)}
+
+    def _trace(self, task: Task) -> TraceRecorder | None:
+        folder = self.plan.traces
+        return None if folder is None else TraceRecorder(folder, task.stem, self.plan.camera)
+
+    def _recorder(self, task: Task, trace: TraceRecorder | None) -> Recorder:
+        if self.plan.recordings is None or task.episode >= self.plan.record:
+            return trace or NullRecorder()
+        from mpgrasp.recording.film import FilmConfig, FilmRecorder
+        from mpgrasp.recording.recorder import TeeRecorder
+        from mpgrasp.recording.rerun import RerunRecorder
+
+        stem = self.plan.recordings / task.stem
+        film = FilmRecorder(f"{stem}.gif", config=FilmConfig(backend=self.plan.camera))
+        recorders: list[Recorder] = [RerunRecorder(f"{stem}.rrd"), film, *([trace] if trace else [])]
+        return TeeRecorder(*recorders)
+
+
+def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> Line:
+    """The line of an episode that could not be played.
+
+    Args:
+        plan: that it belongs to.
+        task: which episode it is.
+        troubles: one (what went wrong, traceback) per attempt.
+    """
+    reports = [f"attempt {k}: {what}\n\n{trace}" for k, (what, trace) in enumerate(troubles, 1)]
+    return {
+        "outcome": ERROR,
+        "success": None,
+        "error": troubles[-1][0],
+        "traceback": "\n".join(reports),
+        **_which(plan, task),
+    }
+
+
+def real_games() -> Games:
+    """The functions that play real episodes, by trial; loads MuJoCo."""
+    from mpgrasp.episode.clearing import run_clearing
+    from mpgrasp.episode.episode import run_episode
+
+    return {"grasp": run_episode, "clear": run_clearing}
+
+
+def _which(plan: Plan, task: Task) -> Line:
+    return {
+        "suite": task.suite,
+        "seed": plan.seed,
+        "scene_seed": episode_seed(task.suite, plan.seed, task.episode),
+        "episode": task.episode,
+        "detector": task.detector,
+        "controller": task.controller,
+    }

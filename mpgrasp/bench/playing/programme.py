@@ -1,0 +1,68 @@
+"""Programmes: several suites in one run, each cell playing all of them, such as all trials of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mpgrasp.bench.playing.plan import every_cell
+from mpgrasp.bench.record import Cell
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.suite import Suite, load_suite, suite_names
+
+
+@dataclass(frozen=True, kw_only=True)
+class Programme:
+    """What stands on the command line in the place of one suite."""
+
+    title: str
+    suites: tuple[str, ...]
+    """In the order in which they are played, each with as many episodes as it declares."""
+    detectors: tuple[str, ...]
+    controllers: tuple[str, ...]
+    references: tuple[Cell, ...]
+    """Played beside every detector with every controller, unless the command line names others."""
+
+    def cells(
+        self, detectors: Sequence[str] | None = None, controllers: Sequence[str] | None = None
+    ) -> tuple[Cell, ...]:
+        """Who plays; if detectors or controllers are given, they replace all of the programme's."""
+        cells = every_cell(detectors or self.detectors, controllers or self.controllers)
+        return cells if detectors or controllers else (*cells, *self.references)
+
+
+PROGRAMMES: dict[str, Programme] = {
+    "paper": Programme(
+        title="The paper's physical trials: Tables III, IV, V and VI",
+        suites=("single", "unseen", "thin", "stacked"),
+        detectors=("ggcnn2", "tfgrasp", "dhrnet"),
+        controllers=("mvp", "mppc"),
+        # the ceiling, and the floor: one look and no closed loop
+        references=(Cell("oracle", "mppc"), Cell("dhrnet", "open_loop")),
+    ),
+}
+"""Programmes by name."""
+
+
+def load_suites(name: str, only: Sequence[str] | None = None) -> tuple[Suite, ...]:
+    """The suites of a programme, in its order, or the one suite of that name or path.
+
+    Args:
+        name: of a programme or a suite, or a path to a declaration.
+        only: those suites of a programme that are wanted; None: all of them.
+
+    Raises:
+        ConfigError: no such programme or suite, or a declaration that cannot be used.
+    """
+    if name in PROGRAMMES:
+        suites = PROGRAMMES[name].suites
+        if only is not None and (not only or not set(only) <= set(suites)):
+            raise ConfigError(f"unknown suite of {name}", got=",".join(only), allowed=suites)
+        return tuple(load_suite(suite) for suite in suites if only is None or suite in only)
+    if only is not None:
+        raise ConfigError("--suites with a single suite", got=name, allowed=tuple(PROGRAMMES))
+    known = suite_names()
+    if name not in known and not name.endswith(".toml"):
+        allowed = [*known, *PROGRAMMES, "a path that ends in .toml"]
+        raise ConfigError("unknown suite", got=name, allowed=allowed)
+    return (load_suite(name),)

@@ -1,0 +1,88 @@
+"""The command that a run was made with, read back from its run.json, and its files found again.
+
+run.json keeps a command as it was typed. A path in it that is not there from the present directory is looked
+for from the folders above the run, of which the directory that it was typed in usually is one.
+"""
+
+from __future__ import annotations
+
+import shlex
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mpgrasp.bench.meshes.files import YCB
+from mpgrasp.bench.results.reader import read_run
+from mpgrasp.exceptions import ConfigError, OutputError
+
+PROGRAM = ("python", "-m", "mpgrasp.bench")
+"""What a recorded command begins with."""
+
+
+def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str] = ()) -> Namespace:
+    """Arguments of the command that a run was made with, with paths that lead to its files from here.
+
+    Args:
+        folder: of the run.
+        parser: of such commands.
+        more: words behind those of the command; `--weights` and `--objects` among them take the place
+            of the command's own.
+
+    Raises:
+        ConfigError: words that cannot be used, or a file that cannot be found.
+        OutputError: no run there, or it does not say by which command it was made.
+    """
+    words = _command_of(read_run(folder), folder)
+    before, added = parser.parse_args(words), parser.parse_args(more)
+    arguments = parser.parse_args([*words, *more])
+    if arguments.suite is None:
+        raise _no_command(folder)
+    if arguments.suite.endswith(".toml"):
+        arguments.suite = _find(arguments.suite, folder)
+    arguments.weights = added.weights or [_find_weights(text, folder) for text in before.weights]
+    arguments.objects = added.objects or [
+        word if word == YCB else _find(word, folder) for word in before.objects
+    ]
+    return arguments
+
+
+def _command_of(run: dict[str, Any], folder: Path) -> list[str]:
+    """Arguments of the command that a run.json says it was made with."""
+    try:
+        words = shlex.split(run["command"])
+    except (KeyError, ValueError, AttributeError) as error:
+        raise _no_command(folder) from error
+    return words[len(PROGRAM) :]
+
+
+def _no_command(folder: Path) -> OutputError:
+    return OutputError(
+        "run.json does not say by which command it was made", got=str(folder), allowed="`command`"
+    )
+
+
+def _find_weights(text: str, folder: Path) -> str:
+    """FILE, or DETECTOR=FILE, with a path that leads to the file."""
+    name, separator, file = text.partition("=")
+    if separator and not _places(text, folder):
+        return f"{name}={_find(file, folder)}"
+    return _find(text, folder)
+
+
+def _find(path: str, folder: Path) -> str:
+    places = _places(path, folder)
+    if not places:
+        raise ConfigError(
+            "a file that the run was made with is not there any more",
+            got=path,
+            allowed=f"that path from this directory or from one above {folder}; where weights are now, "
+            "--weights can say",
+        )
+    return places[0]
+
+
+def _places(path: str, folder: Path) -> list[str]:
+    """Paths that lead to something: as typed, then from the folders above the run, nearest first."""
+    above = [str(parent / path) for parent in folder.absolute().parents]
+    return [place for place in (path, *above) if Path(place).exists()]

@@ -1,0 +1,1 @@
+"""Reports of runs: HTML, Markdown and the table in the terminal."""

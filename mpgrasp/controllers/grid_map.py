@@ -1,0 +1,251 @@
+"""World cells that fuse the grasp maps of many views (eq. 6-9).
+
+Each cell counts what was seen inside it: how often which quality, and which quality together with which
+angle. Reference: Morrison et al., Multi-View Picking, ICRA 2019, whose grid this is. Three things differ
+from the published code: points outside of the grid are dropped, never clipped onto its border; the mean
+quality is that of the observations alone, without the prior, and a cell's rank grows with the number of
+its observations, so that a cell that was hardly seen is never the best; and width and surface height are
+weighted by quality (the paper's text under eq. 7 asks for it), because a detector says nothing useful
+about the width where it sees no grasp, and a cell at an object's edge also holds points of the table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, wrap_half_pi
+from mpgrasp.grasp import Grasp, GraspMap, image_to_world_angle
+from mpgrasp.workspace import WORKSPACE_CENTRE
+
+EXTENT_AS_WRITTEN = 0.68
+"""Edge of the grid, Table I taken by its unit: "68 cm" [m]."""
+EXTENT_PUBLISHED = 0.34
+"""Edge of the grid in published multi-view picking code: 68 cells of 5 mm [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridConfig:
+    """The grid map of Table I."""
+
+    cell: float = 0.005
+    """Edge u of a cell [m]."""
+    extent: float = EXTENT_AS_WRITTEN
+    """Edge of the square grid [m]; J = K = extent / cell."""
+    centre: tuple[float, float] = WORKSPACE_CENTRE
+    """World x and y of the grid's centre [m]."""
+    n_quality: int = 10
+    """N_q, bins of the quality in [0, 1]."""
+    n_angle: int = 18
+    """N_theta, bins of the angle in [-pi/2, pi/2)."""
+    z_floor: float = -0.01
+    """Points lower than this are noise [m]; a little below the table, or half of its points would go."""
+    z_ceiling: float = 0.17
+    """Points higher than this are noise [m]."""
+    evidence: float = 20.0
+    """Observations after which a cell's mean quality counts half in the search for the best cell; three
+    views from the start height bring about as many. 0 ranks by the mean alone."""
+    failure_sigma: float = 0.0075
+    """Radius (1 sigma) around a failed grasp within which quality is lowered [m]."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cell <= self.extent:
+            raise ConfigError("unusable grid", got=(self.cell, self.extent), allowed="0 < cell <= extent [m]")
+        if self.n_quality < 2 or self.n_angle < 2:
+            raise ConfigError("too few bins", got=(self.n_quality, self.n_angle), allowed="2 or more each")
+        if self.z_floor >= self.z_ceiling:
+            raise ConfigError("floor above ceiling", got=self.z_floor, allowed=f"below {self.z_ceiling}")
+        if self.evidence < 0 or self.failure_sigma <= 0:
+            raise ConfigError(
+                "unusable grid weights",
+                got=(self.evidence, self.failure_sigma),
+                allowed="evidence >= 0, sigma > 0",
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(ny, nx) cells."""
+        n = max(1, round(self.extent / self.cell))
+        return n, n
+
+
+@dataclass(eq=False)
+class GridMap:
+    """Histograms over the workspace; row = y, column = x, cell (0, 0) at the smallest x and y."""
+
+    config: GridConfig = field(default_factory=GridConfig)
+
+    def __post_init__(self) -> None:
+        c = self.config
+        ny, nx = c.shape
+        self.x0 = c.centre[0] - nx * c.cell / 2
+        self.y0 = c.centre[1] - ny * c.cell / 2
+        self.quality_counts: NDArray[np.float32] = np.zeros((ny, nx, c.n_quality), np.float32)
+        """q of the paper: observations per quality bin, without prior."""
+        self.counts: NDArray[np.float32] = np.zeros((ny, nx, c.n_angle, c.n_quality), np.float32)
+        """m of the paper: observations per angle and quality bin, without prior."""
+        self.failures: NDArray[np.float32] = np.zeros((ny, nx), np.float32)
+        """By how much quality is lowered after failed grasps."""
+        self._weight = np.zeros(ny * nx)
+        self._weighted_width = np.zeros(ny * nx)
+        self._weighted_height = np.zeros(ny * nx)
+        self._fresh: tuple[FloatArray, FloatArray] | None = None  # observations and mean quality
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns (ny, nx)."""
+        return self.config.shape
+
+    @property
+    def quality_centres(self) -> FloatArray:
+        """(n_q,) what an observation in each bin is worth: the bin's centre.
+
+        Eq. 7 writes n_q / N_q, the upper edge, which overrates everything by half a bin.
+        """
+        return (np.arange(self.config.n_quality) + 0.5) / self.config.n_quality
+
+    @property
+    def angle_centres(self) -> FloatArray:
+        """(n_theta,) centre of each angle bin [rad]."""
+        return (np.arange(self.config.n_angle) + 0.5) / self.config.n_angle * np.pi - np.pi / 2
+
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """World x (nx,) and y (ny,) of the cell centres [m]."""
+        ny, nx = self.shape
+        u = self.config.cell
+        return self.x0 + (np.arange(nx) + 0.5) * u, self.y0 + (np.arange(ny) + 0.5) * u
+
+    def position(self, cell: tuple[int, int]) -> FloatArray:
+        """World (x, y) of a cell's centre [m]."""
+        u = self.config.cell
+        return np.array([self.x0 + (cell[1] + 0.5) * u, self.y0 + (cell[0] + 0.5) * u])
+
+    def cell_at(self, x: float, y: float) -> tuple[int, int] | None:
+        """(row, col) of a world position [m], or None outside of the grid."""
+        ny, nx = self.shape
+        row = int(np.floor((y - self.y0) / self.config.cell))
+        col = int(np.floor((x - self.x0) / self.config.cell))
+        return (row, col) if 0 <= row < ny and 0 <= col < nx else None
+
+    def update(self, grasp_map: GraspMap) -> NDArray[np.intp]:
+        """Add every pixel of a view and return its flat cell index (H, W), -1 where it was dropped.
+
+        Dropped are pixels without depth, outside of the grid, above the ceiling or below the floor.
+        """
+        self._fresh = None
+        c = self.config
+        cells, z = self._locate(grasp_map)
+        seen = cells >= 0
+        index, z = cells[seen], z[seen]
+        quality = np.clip(grasp_map.quality[seen], 0.0, 1.0)
+        q_bin = np.minimum((quality * c.n_quality).astype(np.intp), c.n_quality - 1)
+        # the camera looks down, so that world angle = image angle + heading of the image's u axis
+        heading = image_to_world_angle(0.0, grasp_map.T_world_camera)
+        turns = grasp_map.angle[seen] / np.float32(np.pi) + np.float32(heading / np.pi + 0.5)
+        angle_bin = np.minimum(((turns - np.floor(turns)) * c.n_angle).astype(np.intp), c.n_angle - 1)
+        width = grasp_map.width[seen] * grasp_map.depth[seen] / np.float32(grasp_map.intrinsics.fx)
+
+        ones = np.float32(1.0)
+        np.add.at(self.quality_counts.reshape(-1), index * c.n_quality + q_bin, ones)
+        np.add.at(self.counts.reshape(-1), (index * c.n_angle + angle_bin) * c.n_quality + q_bin, ones)
+        n = self._weight.size
+        self._weight += np.bincount(index, weights=quality, minlength=n)
+        self._weighted_width += np.bincount(index, weights=quality * width, minlength=n)
+        self._weighted_height += np.bincount(index, weights=quality * z, minlength=n)
+        return cells
+
+    def _locate(self, grasp_map: GraspMap) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+        """Flat cell index (H, W), -1 where the point is dropped, and world z (H, W) [m]."""
+        c, k = self.config, grasp_map.intrinsics
+        ny, nx = self.shape
+        R, t = grasp_map.T_world_camera[:3, :3], grasp_map.T_world_camera[:3, 3]
+        a = (np.arange(k.width) - k.cx) / k.fx  # (W,)
+        b = ((np.arange(k.height) - k.cy) / k.fy)[:, None]  # (H, 1)
+        depth = grasp_map.depth
+        # single precision: 1e-7 of a metre is far below the sensor's noise
+        x, y, z = (
+            depth * (R[i, 0] * a + R[i, 1] * b + R[i, 2]).astype(np.float32) + np.float32(t[i])
+            for i in range(3)
+        )
+        with np.errstate(invalid="ignore"):
+            col = np.floor((x - np.float32(self.x0)) * np.float32(1 / c.cell))
+            row = np.floor((y - np.float32(self.y0)) * np.float32(1 / c.cell))
+            # comparisons with NaN are false: pixels without depth drop out here
+            seen = (col >= 0) & (col < nx) & (row >= 0) & (row < ny) & (z >= c.z_floor) & (z <= c.z_ceiling)
+            seen &= np.isfinite(grasp_map.quality + grasp_map.angle + grasp_map.width)
+            cells = np.where(seen, row * nx + col, -1.0).astype(np.intp)
+        return cells, z
+
+    def observations(self) -> FloatArray:
+        """(ny, nx) points seen in each cell."""
+        return self._summary()[0]
+
+    def mean_quality(self) -> FloatArray:
+        """Mean quality (ny, nx) of the observations, eq. 7, less what failures took; 0 where unseen."""
+        return self._summary()[1]
+
+    def _summary(self) -> tuple[FloatArray, FloatArray]:
+        if self._fresh is None:
+            centres = self.quality_centres.astype(np.float32)
+            sums = self.quality_counts @ np.column_stack([np.ones_like(centres), centres])  # (ny, nx, 2)
+            n, total = sums[..., 0], sums[..., 1]
+            self._fresh = n, np.clip(total / np.maximum(n, 1) - self.failures, 0.0, 1.0)
+        return self._fresh
+
+    def mean_angle(self, cell: tuple[int, int]) -> float:
+        """Mean closing direction of a cell [rad], eq. 8, weighted by quality.
+
+        Angles are doubled before averaging (a grasp is the same after half a turn); eq. 8 as printed
+        would make 0 out of -89 and +89 degrees.
+        """
+        weight = self.counts[cell] @ self.quality_centres  # (n_theta,)
+        s, c = weight @ np.sin(2 * self.angle_centres), weight @ np.cos(2 * self.angle_centres)
+        return float(wrap_half_pi(np.arctan2(s, c) / 2))
+
+    def mean_width(self, cell: tuple[int, int]) -> float:
+        """Mean opening of a cell [m], eq. 9, weighted by quality; 0 where no grasp was ever seen."""
+        return self._weighted_mean(self._weighted_width, cell)
+
+    def mean_height(self, cell: tuple[int, int]) -> float:
+        """Mean surface height of a cell [m], weighted by quality; 0 where no grasp was ever seen."""
+        return self._weighted_mean(self._weighted_height, cell)
+
+    def _weighted_mean(self, total: FloatArray, cell: tuple[int, int]) -> float:
+        flat = cell[0] * self.shape[1] + cell[1]
+        return float(total[flat] / self._weight[flat]) if self._weight[flat] > 0 else 0.0
+
+    def best_cell(self) -> tuple[int, int] | None:
+        """The cell of the highest mean quality among those seen often enough (see `GridConfig.evidence`).
+
+        None where every observation fell into the lowest quality bin: such a map says nothing.
+        """
+        n, quality = self._summary()
+        rank = quality * n / np.maximum(n + self.config.evidence, 1)
+        rank[self.quality_counts[..., 0] >= n] = 0.0
+        best = np.unravel_index(np.argmax(rank), rank.shape)
+        return (int(best[0]), int(best[1])) if rank[best] > 0 else None
+
+    def grasp(self, cell: tuple[int, int]) -> Grasp:
+        """The grasp of a cell, eq. 6: at its centre, on its mean surface, with its mean angle and width."""
+        return Grasp(
+            position=np.array([*self.position(cell), self.mean_height(cell)]),
+            angle=self.mean_angle(cell),
+            width=self.mean_width(cell),
+            quality=float(self.mean_quality()[cell]),
+        )
+
+    def best_grasp(self) -> Grasp | None:
+        """The grasp of the best cell, or None where no grasp was seen."""
+        cell = self.best_cell()
+        return None if cell is None else self.grasp(cell)
+
+    def suppress(self, position: FloatArray) -> None:
+        """Lower quality around a failed grasp at world (x, y[, z]) [m]; earlier failures fade by half."""
+        self._fresh = None
+        x, y = self.axes()
+        squared = (x - position[0]) ** 2 + ((y - position[1]) ** 2)[:, None]  # (ny, nx)
+        bump = np.exp(-0.5 * squared / self.config.failure_sigma**2)
+        self.failures = (0.5 * self.failures + 0.5 * bump).astype(np.float32)

@@ -1,0 +1,1 @@
+"""The networks: image in; quality, cosine, sine and width out."""

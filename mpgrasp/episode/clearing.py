@@ -1,0 +1,266 @@
+"""A table to be cleared (the paper's Table VI): pick, carry to the basket, drop, return, over and over.
+
+Every attempt is one of `Episode`, with the same detector and controller in closed loop, from the same
+start. It is judged by physics: what it lifted must lie in the basket when the arm is back. Simulated time
+counts, that of failures and of recovering from protective stops included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from mpgrasp.controllers.controller import Controller
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.episode.config import ClearingConfig
+from mpgrasp.episode.episode import Episode, controller_seed, reach
+from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.motion.arm_driver import OnTick
+from mpgrasp.motion.reflex import Reflex
+from mpgrasp.motion.trajectory import path_profile
+from mpgrasp.outcome import Outcome
+from mpgrasp.recording.recorder import Recorder
+from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.scene import Scene
+from mpgrasp.workspace import WORKSPACE_CENTRE, WORKSPACE_REACH
+
+FALLEN = -0.02
+"""An object whose frame lies lower than this over the table has fallen off it [m]."""
+DROPS = ((-0.03, -0.05), (0.03, 0.05), (-0.03, 0.05), (0.03, -0.05), (0.0, 0.0))
+"""Where in the basket the hand opens, in turn: x, y from its centre [m]. A single heap would overflow."""
+CONTACT = 12.0
+"""Force at which the hand opens above the basket because it is on something [N]: more than things weigh."""
+GUIDED_RATE = 0.5
+"""Speed of the fastest joint when the arm is guided home [rad/s]."""
+FAILED_GRASPS = (Outcome.COLLISION, Outcome.MISSED, Outcome.SLIPPED, Outcome.REFLEX)
+"""Endings after which the object is still where it was grasped at, more or less."""
+
+
+def run_clearing(
+    scene_config: SceneConfig,
+    seed: int,
+    *,
+    detector: GraspDetector,
+    controller: Controller,
+    config: ClearingConfig | None = None,
+    recorder: Recorder | None = None,
+) -> ClearingResult:
+    """Play one episode until the table is clear, the time is up or nothing more is found.
+
+    Args:
+        scene_config: what is on the table; with a basket.
+        seed: of the scene, the start pose and the sensor noise; 0 is a seed.
+        detector: is reset before every attempt, with the truth of that moment where it reads it.
+        controller: is reset before every attempt. One that has `remember_failure(position)` is then
+            told where grasps have failed since the last success, oldest first.
+        config: how the episode runs.
+        recorder: is shown everything.
+
+    Raises:
+        ConfigError: a scene without a basket, or one that cannot be built.
+        CameraError: a camera backend that this machine does not have, or that has no colour for a detector
+            that reads it.
+    """
+    config = config or ClearingConfig()
+    require_basket(scene_config)
+    episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
+    try:
+        return Clearing(episode, controller, config).play()
+    finally:
+        episode.close()
+
+
+def require_basket(scene_config: SceneConfig) -> None:
+    """Raise ConfigError unless there is a basket to carry things to."""
+    if not scene_config.basket:
+        raise ConfigError("nowhere to carry things to", got="basket = false", allowed="basket = true")
+
+
+class Basket:
+    """Where a scene's drop basket stands, and what lies in it."""
+
+    def __init__(self, scene: Scene) -> None:
+        floor = scene.model.geom("basket/floor")
+        self.centre: FloatArray = scene.model.body("basket/body").pos[:2] + floor.pos[:2]
+        """World x, y [m]."""
+        self._half: FloatArray = np.array(floor.size[:2])
+
+    def holds(self, position: FloatArray) -> bool:
+        """Whether a world position (3,) [m] is in the basket or heaped upon what is."""
+        return bool(np.all(np.abs(position[:2] - self.centre) <= self._half) and position[2] > 0)
+
+
+class Clearing:
+    """One clearing, attempt by attempt.
+
+    Args:
+        episode: a fresh one, with the arm at its start.
+        controller: picks where to go and what to grasp.
+        config: how the table is cleared.
+    """
+
+    def __init__(self, episode: Episode, controller: Controller, config: ClearingConfig) -> None:
+        self.episode, self.controller, self.config = episode, controller, config
+        self.basket = Basket(episode.scene)
+        self.picks: list[Pick] = []
+        self.stops: list[Reflex] = []
+        self._start_time = episode.simulation.time
+        self._T_start, self._q_start = episode.driver.T_desired.copy(), episode.driver.q.copy()
+        self._failed_at: list[FloatArray] = []
+        self._blind = self._drops = 0
+        self._min_singular_value, self._near = np.inf, 0.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the start [s]."""
+        return self.episode.simulation.time - self._start_time
+
+    def play(self) -> ClearingResult:
+        """Attempt after attempt, to the end."""
+        while (outcome := self._ending()) is None:
+            if self.picks:
+                self.episode.begin()
+            self.picks.append(self._pick())
+        in_basket, knocked_off, left = self._whereabouts()
+        text = f"{outcome}: {len(in_basket)} in the basket, {len(left)} left, {len(knocked_off)} knocked off"
+        self.episode.recorder.finish(text)
+        return ClearingResult(
+            outcome=outcome,
+            picks=tuple(self.picks),
+            in_basket=in_basket,
+            knocked_off=knocked_off,
+            left=left,
+            sim_time_s=self.time,
+            time_limit_s=self.config.time_limit,
+            ticks=self.episode.ticks,
+            stops=tuple(self.stops),
+            min_singular_value=self._min_singular_value,
+            near_singularity_s=self._near,
+            timing=self.episode.timing(),
+            state_hash=self.episode.simulation.state_hash(),
+        )
+
+    def _ending(self) -> Outcome | None:
+        if self.time > self.config.time_limit:
+            return Outcome.TIMEOUT
+        if not self._whereabouts()[2]:
+            return Outcome.SUCCESS
+        return Outcome.NO_GRASP if self._blind >= self.config.blind_attempts else None
+
+    def _whereabouts(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+        """Names of the objects in the basket, lost, and still to be picked."""
+        places: tuple[list[str], list[str], list[str]] = ([], [], [])
+        for name in self.episode.scene.objects:
+            position = self.episode.simulation.object_pose(name)[:3, 3]
+            away = float(np.abs(position[:2] - WORKSPACE_CENTRE).max())
+            lost = position[2] < FALLEN or away > WORKSPACE_REACH
+            places[0 if self.basket.holds(position) else 1 if lost else 2].append(name)
+        return tuple(places[0]), tuple(places[1]), tuple(places[2])
+
+    def _pick(self) -> Pick:
+        episode, driver, start = self.episode, self.episode.driver, self.time
+        self.controller.reset(controller_seed(episode.seed, len(self.picks)))
+        remember = getattr(self.controller, "remember_failure", None)
+        if remember is not None:
+            for position in self._failed_at:
+                remember(position)
+        result = episode.attempt(reach(episode, self.controller))
+        if result.success:
+            self._carry()
+            if driver.reflex is not None:
+                result = replace(result, outcome=Outcome.REFLEX, reflex=driver.reflex)
+        self._return()
+        if result.success and result.object not in self._whereabouts()[0]:
+            result = replace(result, outcome=Outcome.DROPPED)
+        self._learn(result)
+        self._tally()
+        return Pick(result=result, start_s=start, end_s=self.time)
+
+    def _carry(self) -> None:
+        """Take what is in the hand to the basket and let go of it."""
+        episode, driver, c = self.episode, self.episode.driver, self.config
+        self._rise("carry")
+        spot = self.basket.centre + DROPS[self._drops % len(DROPS)]
+        self._drops += 1
+        # heading of the start: long things, grasped across, lie along the basket
+        target = looking_down([*spot, c.carry_height])
+        driver.move_to(target, c.carry_speed, on_tick=self._showing("carry"))
+        target[2, 3] = c.drop_height
+        driver.move_to(
+            target, c.lower_speed, until=lambda: driver.touch > CONTACT, on_tick=self._showing("carry")
+        )
+        if driver.reflex is None:
+            episode.simulation.open_gripper()
+            driver.wait(c.drop_time, self._showing("drop"))
+
+    def _return(self) -> None:
+        """Bring the arm back to its start: where protective stops do not let it, joint by joint."""
+        simulation, driver = self.episode.simulation, self.episode.driver
+        for _ in range(2):
+            if driver.reflex is not None:
+                self._recover()
+            simulation.open_gripper()
+            if driver.T_desired[2, 3] < self.config.drop_height:
+                self._rise("return")  # the hand may stand between objects
+            driver.move_to(self._T_start, on_tick=self._showing("return"))
+            if driver.reflex is None:
+                return
+        self._recover()
+        self._guide_home()
+
+    def _recover(self) -> None:
+        """Stand still for as long as a stop costs, then take the arm over again where it is."""
+        driver = self.episode.driver
+        assert driver.reflex is not None
+        self.stops.append(driver.reflex)
+        self._tally()
+        for _ in range(round(self.config.recovery_time / driver.config.dt)):
+            self._step("recover")
+        driver.reset()
+
+    def _guide_home(self) -> None:
+        """Turn all joints back to the start at once, as somebody's hand would: no limit watches this."""
+        driver = self.episode.driver
+        q, way = driver.q, self._q_start - driver.q
+        done = 0.0
+        for share in path_profile(0.0, float(np.abs(way).max()), driver.config, 1.0, GUIDED_RATE):
+            self.episode.simulation.set_arm_target(q + way * share, way * (share - done) / driver.config.dt)
+            done = share
+            self._step("recover")
+        driver.reset()
+
+    def _step(self, phase: str) -> None:
+        """One tick of the velocity loop in which the driver has no say."""
+        driver = self.episode.driver
+        self.episode.simulation.step(driver.steps_per_tick)
+        self._showing(phase)(driver)
+
+    def _rise(self, phase: str) -> None:
+        target = self.episode.driver.T_desired.copy()
+        target[2, 3] = max(target[2, 3], self.config.carry_height)
+        self.episode.driver.move_to(target, self.config.carry_speed, on_tick=self._showing(phase))
+
+    def _learn(self, result: EpisodeResult) -> None:
+        """What the next attempt is to know."""
+        if result.outcome is Outcome.NO_GRASP:
+            self._blind += 1
+        else:
+            self._blind = 0
+        if result.grasp is not None and result.outcome in FAILED_GRASPS:
+            self._failed_at.append(result.grasp.position)
+        elif result.outcome in (Outcome.SUCCESS, Outcome.DROPPED, Outcome.NO_GRASP):
+            # the scene is another one, or nothing else is there to be tried
+            self._failed_at.clear()
+
+    def _tally(self) -> None:
+        """Keep what the driver has measured since its last reset."""
+        measured = self.episode.driver.statistics()
+        self._min_singular_value = min(self._min_singular_value, measured.min_singular_value)
+        self._near += measured.near_singularity
+
+    def _showing(self, phase: str) -> OnTick:
+        return partial(self.episode.record_motion, phase)

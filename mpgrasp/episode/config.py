@@ -1,0 +1,81 @@
+"""How an episode runs, whatever the detector and the controller: one grasp, or a table to be cleared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mpgrasp.camera.wrist_camera import BACKENDS
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.motion.execution_config import ExecutionConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeConfig:
+    """How a single grasp runs."""
+
+    control_dt: float = 0.1
+    """Period of the control tick: image, detection, decision [s]."""
+    start_height: float = 0.50
+    """Height of the tool point over the table at the start [m], Table I's z_max."""
+    start_jitter: float = 0.05
+    """Standard deviation of the first viewpoint about the workspace's centre, in x and in y [m]; drawn
+    within two standard deviations."""
+    max_reach_time: float = 20.0
+    """A reach that takes longer is a timeout [s]."""
+    camera_backend: str = "auto"
+    """auto, gl or ray."""
+    camera_crop: int | None = 350
+    """Central square of the 640 x 480 image that is rendered [px]; None for the whole image."""
+    noise: bool = True
+    """Whether the depth camera is as noisy as a D435."""
+    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
+    """How the chosen grasp is executed and judged."""
+
+    def __post_init__(self) -> None:
+        for name in ("control_dt", "start_height", "max_reach_time"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        if self.start_jitter < 0:
+            raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
+        if self.camera_backend not in BACKENDS:
+            raise ConfigError("unknown camera backend", got=self.camera_backend, allowed=BACKENDS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClearingConfig(EpisodeConfig):
+    """How a table is cleared: pick, carry to the basket, drop, return, over and over."""
+
+    time_limit: float = 900.0
+    """No attempt begins later than this, and a table that is clear only then counts as a timeout
+    [s, simulated]; the slowest of the paper's methods took 721 s."""
+    blind_attempts: int = 3
+    """So many attempts in a row in which nothing to grasp was found end the episode."""
+    recovery_time: float = 5.0
+    """What a protective stop costs until the arm moves again: the stop is noticed, acknowledged and
+    recovered from [s]. Not a figure of the robot, but the same for all."""
+    carry_height: float = 0.30
+    """Height of the tool point over the table on its way to the basket [m]."""
+    drop_height: float = 0.18
+    """Height of the tool point over the table at which the hand opens above the basket, unless what it
+    holds comes to stand on something before [m]."""
+    carry_speed: float = 0.25
+    """[m/s]"""
+    lower_speed: float = 0.1
+    """Of the last part of the way, into the basket [m/s]."""
+    drop_time: float = 0.4
+    """For which the open hand waits above the basket [s]."""
+    execution: ExecutionConfig = field(
+        default_factory=lambda: ExecutionConfig(hold_time=0.0, shake_time=0.0, settle_after_shake=0.0)
+    )
+    """How each grasp is executed: carrying takes the place of hold and shake."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("time_limit", "carry_height", "drop_height", "carry_speed", "lower_speed"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        for name in ("recovery_time", "drop_time"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} must not be negative", got=getattr(self, name))
+        if self.blind_attempts < 1:
+            raise ConfigError("blind_attempts counts attempts", got=self.blind_attempts, allowed="1 or more")

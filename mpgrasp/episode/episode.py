@@ -1,0 +1,293 @@
+"""One closed-loop grasp attempt: look and move at 10 Hz from z_max to z_min, then grasp, lift, judge.
+
+The scene, the start pose and the sensor noise depend on the seed alone, so that every detector and
+every controller meets the same world: the noise of a tick is drawn anew from (seed, tick).
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+import numpy as np
+
+from mpgrasp.camera.noise import DepthNoise
+from mpgrasp.camera.wrist_camera import WristCamera
+from mpgrasp.controllers.controller import Command, Controller, Observation
+from mpgrasp.depth import DepthFrame
+from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
+from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.metrics import ReachMetrics
+from mpgrasp.episode.result import EpisodeResult
+from mpgrasp.geometry import FloatArray, invert, looking_down
+from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.motion.arm_driver import ArmDriver, MotionStatistics
+from mpgrasp.motion.execution import execute_grasp
+from mpgrasp.motion.ik import solve_pose
+from mpgrasp.outcome import Outcome
+from mpgrasp.recording.recorder import NullRecorder, Recorder, TickRecord
+from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.scene import build_scene
+from mpgrasp.scene.simulation import Simulation
+from mpgrasp.workspace import WORKSPACE_CENTRE
+
+STAGES = ("render", "detect", "control", "ik", "physics")
+"""What a control tick of the reach spends its time on."""
+
+# streams of an episode's seed beside those of the scene
+_NOISE_STREAM = 11
+_START_STREAM = 12
+_CONTROLLER_STREAM = 13
+_TICK_PERIOD = 0.1  # [s], between two records of a recording once the reach is over
+
+
+def run_episode(
+    scene_config: SceneConfig,
+    seed: int,
+    *,
+    detector: GraspDetector,
+    controller: Controller,
+    config: EpisodeConfig | None = None,
+    recorder: Recorder | None = None,
+) -> EpisodeResult:
+    """Play one episode from the settled scene to the verdict of physics.
+
+    Args:
+        scene_config: what is on the table.
+        seed: of the scene, the start pose and the sensor noise; 0 is a seed.
+        detector: is reset, then asked once a tick.
+        controller: is reset, then asked once a tick.
+        config: how the episode runs.
+        recorder: is shown every tick.
+
+    Raises:
+        ConfigError: a scene that cannot be built.
+        CameraError: a camera backend that this machine does not have, or that has no colour for a detector
+            that reads it.
+    """
+    episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
+    try:
+        controller.reset(controller_seed(seed))
+        return episode.conclude(reach(episode, controller))
+    finally:
+        episode.close()
+
+
+def reach(episode: Episode, controller: Controller) -> Grasp | None:
+    """Look and move under a controller until it is done: its grasp; None without one or if interrupted."""
+    while episode.interruption() is None:
+        observation = episode.look()
+        with episode.timed("control"):
+            command = controller.update(observation)
+        episode.act(command, controller.diagnostics())
+        if command.done:
+            break
+    return controller.final_grasp() if episode.interruption() is None else None
+
+
+def controller_seed(seed: int, attempt: int = 0) -> int:
+    """Seed that the controller of an episode's attempt is told; the scene cannot be built from it."""
+    stream = [seed, _CONTROLLER_STREAM, attempt] if attempt else [seed, _CONTROLLER_STREAM]
+    return int(np.random.default_rng(stream).integers(2**32))
+
+
+class Episode:
+    """One attempt, taken tick by tick: look and act in turn, then conclude.
+
+    `run_episode` steps it with a controller, `mpgrasp.env` with whatever a learner decides, and
+    `mpgrasp.episode.clearing` takes several attempts in one world: `attempt` and `begin` in turn.
+
+    Args:
+        scene_config: what is on the table.
+        seed: of the scene, the start pose and the sensor noise.
+        detector: is reset here, then asked at every look.
+        config: how the episode runs.
+        recorder: is shown every tick.
+    """
+
+    def __init__(
+        self,
+        scene_config: SceneConfig,
+        seed: int,
+        *,
+        detector: GraspDetector,
+        config: EpisodeConfig | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.config, self.seed, self.detector = config or EpisodeConfig(), seed, detector
+        self.recorder = recorder or NullRecorder()
+        self.scene = build_scene(scene_config, seed)
+        self.simulation = Simulation(self.scene)
+        self.camera = WristCamera(
+            self.scene.model,
+            self.config.camera_backend,
+            DepthNoise() if self.config.noise else None,
+            crop=self.config.camera_crop,
+            colour=reads_colour(detector),
+        )
+        self.simulation.set_q(self._start_q())
+        self.driver = ArmDriver(self.simulation)
+        self.ticks = 0
+        """Control ticks, of all attempts."""
+        self.frame: DepthFrame | None = None
+        """What the camera saw at the last look."""
+        self._grasp_map: GraspMap | None = None
+        self._times: dict[str, list[float]] = defaultdict(list)
+        self._last_record = -np.inf
+        self.recorder.start(self.simulation)
+        self.begin()
+
+    def begin(self) -> None:
+        """Start an attempt from where the arm rests: its clock, its metrics and the truth anew."""
+        self.driver.reset()
+        self.start_time, self._first_tick = self.simulation.time, self.ticks
+        self.metrics = ReachMetrics()
+        self._grasp: Grasp | None = None
+        self._reason = ""
+        truth = reads_truth(self.detector)
+        self.detector.reset(self.scene.height_map(data=self.simulation.data) if truth else None)
+
+    def look(self) -> Observation:
+        """The view of this tick. Its noise depends on seed and tick alone: looking twice shows the same."""
+        rng = np.random.default_rng([self.seed, _NOISE_STREAM, self.ticks])
+        with self.timed("render"):
+            self.frame = self.camera.capture(self.simulation.data, rng)
+        with self.timed("detect"):
+            self._grasp_map = self.detector.predict(self.frame)
+        time_s = self.simulation.time - self.start_time
+        self.metrics.look(time_s, self._grasp_map)
+        return Observation(
+            time=time_s,
+            T_world_tcp=self.simulation.T_world_tcp,
+            grasp_map=self._grasp_map,
+        )
+
+    def act(self, command: Command, diagnostics: Mapping[str, FloatArray | float | bool]) -> None:
+        """Do until the next tick what was commanded; nothing but the gripper moves where that is done."""
+        self.ticks += 1
+        self.simulation.open_gripper(command.gripper)
+        before = self.driver.statistics()
+        if not command.done:
+            self.driver.drive(command.twist, self.config.control_dt, self.metrics.tick)
+            after = self.driver.statistics()
+            self._times["ik"].append(after.ik_seconds - before.ik_seconds)
+            self._times["physics"].append(after.physics_seconds - before.physics_seconds)
+        self._record("reach", self.frame, self._grasp_map, diagnostics)
+
+    def interruption(self) -> Outcome | None:
+        """What ended the reach before a grasp, if anything: reflex or timeout."""
+        if self.driver.reflex is not None:
+            return Outcome.REFLEX
+        late = self.simulation.time - self.start_time >= self.config.max_reach_time
+        return Outcome.TIMEOUT if late else None
+
+    def conclude(self, grasp: Grasp | None) -> EpisodeResult:
+        """Execute the grasp, unless the reach was interrupted, judge, and end the recording."""
+        result = self.attempt(grasp)
+        self.recorder.finish(self._verdict(result.outcome))
+        return result
+
+    def attempt(self, grasp: Grasp | None) -> EpisodeResult:
+        """Execute the grasp, unless the reach was interrupted, and judge."""
+        reach = self.driver.statistics()
+        outcome, lifted = self.interruption(), None
+        if outcome is None and grasp is None:
+            outcome = Outcome.NO_GRASP
+        elif outcome is None and grasp is not None:
+            self._grasp = grasp
+            execution = execute_grasp(self.driver, grasp, self.config.execution, on_tick=self.record_motion)
+            outcome, lifted = Outcome(execution.outcome), execution.lifted
+            self._reason = execution.reason
+        assert outcome is not None
+        return self._result(outcome, lifted, reach)
+
+    def record_motion(self, phase: str, driver: ArmDriver) -> None:
+        """Show the recorder a tick of a motion that is no reach, as often as one of a reach."""
+        if self.simulation.time - self._last_record >= _TICK_PERIOD - 1e-6:
+            self._record(phase, None, None, {})
+
+    def timing(self) -> dict[str, float]:
+        """Median wall time of each stage of a tick so far [ms]."""
+        return {stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES}
+
+    def close(self) -> None:
+        """Free the camera."""
+        self.camera.close()
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Count the wall time of the block to one of `STAGES`."""
+        clock = time.perf_counter()
+        yield
+        self._times[stage].append(time.perf_counter() - clock)
+
+    def _start_q(self) -> FloatArray:
+        """Arm posture that puts the camera over the jittered start, looking straight down."""
+        rng = np.random.default_rng([self.seed, _START_STREAM])
+        jitter = np.clip(rng.standard_normal(2), -2, 2) * self.config.start_jitter
+        simulation = self.simulation
+        T_tcp_camera = invert(simulation.T_world_tcp) @ self.camera.pose(simulation.data)
+        T = looking_down([*(np.array(WORKSPACE_CENTRE) + jitter), self.config.start_height])
+        T[:2, 3] -= (T[:3, :3] @ T_tcp_camera[:3, 3])[:2]
+        return solve_pose(simulation.q, T)
+
+    def _result(self, outcome: Outcome, lifted: str | None, reach: MotionStatistics) -> EpisodeResult:
+        whole = self.driver.statistics()
+        return EpisodeResult(
+            outcome=outcome,
+            object=lifted or self._target(),
+            sim_time_s=self.simulation.time - self.start_time,
+            ticks=self.ticks - self._first_tick,
+            reflex=self.driver.reflex,
+            min_singular_value=whole.min_singular_value,
+            near_singularity_s=whole.near_singularity,
+            path_length_m=reach.path_length,
+            jerk_rms=reach.jerk_rms,
+            spectral_arc_length=self.metrics.spectral_arc_length,
+            first_detection_s=self.metrics.first_detection_s,
+            blind_drift_m=self.metrics.blind_drift_m,
+            grasp=self._grasp,
+            timing=self.timing(),
+            state_hash=self.simulation.state_hash(),
+        )
+
+    def _target(self) -> str:
+        """The object nearest to the chosen grasp; the scene's first where there is none."""
+        if self._grasp is None:
+            return self.scene.objects[0]
+        position = self._grasp.position[:2]
+        return min(
+            self.scene.objects,
+            key=lambda name: float(np.linalg.norm(self.simulation.object_pose(name)[:2, 3] - position)),
+        )
+
+    def _verdict(self, outcome: Outcome) -> str:
+        reason = str(self.driver.reflex) if outcome is Outcome.REFLEX else self._reason
+        return f"{outcome}: {reason}" if reason else str(outcome)
+
+    def _record(
+        self,
+        phase: str,
+        frame: DepthFrame | None,
+        grasp_map: GraspMap | None,
+        diagnostics: Mapping[str, FloatArray | float | bool],
+    ) -> None:
+        self._last_record = self.simulation.time
+        driver = self.driver
+        self.recorder.tick(
+            TickRecord(
+                phase=phase,
+                simulation=self.simulation,
+                frame=frame,
+                grasp_map=grasp_map,
+                diagnostics=diagnostics,
+                twist_commanded=driver.twist_commanded,
+                twist_achieved=driver.twist_achieved,
+                min_singular_value=driver.min_singular_value,
+                manipulability=driver.manipulability,
+                grasp=self._grasp,
+                event=None if driver.reflex is None else str(driver.reflex),
+            )
+        )

@@ -1,0 +1,1 @@
+"""Commands that show what detectors see and how exact they are."""

@@ -1,0 +1,1 @@
+"""Recordings of episodes: for rerun, as film, and as pictures for the report."""

@@ -1,0 +1,104 @@
+"""What an episode tells a recorder, the recorder that keeps nothing and the one that tells several others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from mpgrasp.depth import DepthFrame
+from mpgrasp.exceptions import OutputError
+from mpgrasp.geometry import FloatArray
+from mpgrasp.grasp import Grasp, GraspMap
+
+if TYPE_CHECKING:
+    from mpgrasp.scene.simulation import Simulation
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TickRecord:
+    """One instant of an episode. Fields are None where the phase has no such thing."""
+
+    phase: str
+    """reach, pregrasp, descend, close, lift, hold or shake."""
+    simulation: Simulation
+    """The live world: read poses from it, change nothing."""
+    frame: DepthFrame | None
+    grasp_map: GraspMap | None
+    diagnostics: Mapping[str, FloatArray | float | bool]
+    """`Controller.diagnostics()`: grids (ny, nx) such as entropy and utility, and scalars."""
+    twist_commanded: FloatArray
+    """(6,) world axes [m/s, rad/s]."""
+    twist_achieved: FloatArray
+    """(6,) world axes [m/s, rad/s]."""
+    min_singular_value: float
+    manipulability: float
+    grasp: Grasp | None
+    """The grasp in hand, once one is chosen."""
+    event: str | None = None
+    """A reflex or an outcome, in words."""
+
+
+class Recorder(Protocol):
+    """Keeps what it is shown of an episode."""
+
+    def start(self, simulation: Simulation) -> None: ...
+
+    def tick(self, record: TickRecord) -> None: ...
+
+    def finish(self, event: str) -> None:
+        """The episode is over; `event` is the outcome in words."""
+        ...
+
+
+class NullRecorder:
+    """Keeps nothing."""
+
+    def start(self, simulation: Simulation) -> None:
+        pass
+
+    def tick(self, record: TickRecord) -> None:
+        pass
+
+    def finish(self, event: str) -> None:
+        pass
+
+
+class TeeRecorder:
+    """Shows everything to several recorders, in their order."""
+
+    def __init__(self, *recorders: Recorder) -> None:
+        self.recorders = recorders
+
+    def start(self, simulation: Simulation) -> None:
+        for recorder in self.recorders:
+            recorder.start(simulation)
+
+    def tick(self, record: TickRecord) -> None:
+        for recorder in self.recorders:
+            recorder.tick(record)
+
+    def finish(self, event: str) -> None:
+        for recorder in self.recorders:
+            recorder.finish(event)
+
+
+def claim_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    """Make sure, before an episode is played, that its recording can be written; creates directories.
+
+    Raises:
+        OutputError: another suffix, or a place that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise OutputError("unknown kind of recording", got=str(path), allowed=suffixes)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb"):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"a recording cannot be written: {error.strerror}", got=str(path), allowed="a writable directory"
+        ) from error
+    return path

@@ -1,0 +1,106 @@
+"""The cloth on the table: a smooth random height field whose unevenness decides trials on thin objects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from mpgrasp.geometry import FloatArray
+from mpgrasp.workspace import WORKSPACE_CENTRE
+
+HALF_EXTENT = 0.42
+"""Half the cloth's edge [m]."""
+GRID = 0.007
+"""Spacing of the height field's points [m]."""
+HEM = 0.03
+"""The cloth flattens out towards its edge over this length [m]."""
+RGBA = (0.62, 0.60, 0.56, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Cloth:
+    """Heights of the cloth over the table; zero beyond its edge."""
+
+    elevation: FloatArray
+    """(n, n) [m] at x = WORKSPACE_CENTRE[0] - HALF_EXTENT + col * GRID, y with row likewise; least 0."""
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Height [m] at world positions, on the same triangles that MuJoCo collides with and shows."""
+        n = len(self.elevation)
+        u = (np.asarray(x, float) - WORKSPACE_CENTRE[0] + HALF_EXTENT) / GRID
+        v = (np.asarray(y, float) - WORKSPACE_CENTRE[1] + HALF_EXTENT) / GRID
+        inside = (u >= 0) & (u <= n - 1) & (v >= 0) & (v <= n - 1)
+        col = np.clip(u.astype(int), 0, n - 2)
+        row = np.clip(v.astype(int), 0, n - 2)
+        a, b = u - col, v - row
+        h = self.elevation
+        h00, h11 = h[row, col], h[row + 1, col + 1]
+        # each square is split along its diagonal from (row, col) to (row + 1, col + 1)
+        corner = np.where(a > b, h[row, col + 1], h[row + 1, col])
+        along, across = np.maximum(a, b), np.minimum(a, b)
+        return np.where(inside, h00 + along * (corner - h00) + across * (h11 - corner), 0.0)
+
+    def highest(self, x: float, y: float, radius: float) -> float:
+        """Highest point [m] within a square of half edge `radius` about (x, y)."""
+        n = len(self.elevation)
+        low = np.array([y - WORKSPACE_CENTRE[1], x - WORKSPACE_CENTRE[0]]) + HALF_EXTENT
+        i, j = np.clip(np.floor((low - radius) / GRID).astype(int), 0, n - 1)
+        k, m = np.clip(np.ceil((low + radius) / GRID).astype(int), 0, n - 1)
+        return float(self.elevation[i : k + 1, j : m + 1].max())
+
+
+def make_cloth(unevenness: float, wavelength: float, rng: np.random.Generator) -> Cloth:
+    """A Gaussian random surface.
+
+    Args:
+        unevenness: root mean square of the height about its mean, away from the hem [m]; 0 = flat.
+        wavelength: mean distance between crests along a straight line [m].
+        rng: drawn from the same number of times whatever the other arguments are.
+    """
+    n = round(2 * HALF_EXTENT / GRID) + 1
+    noise = rng.standard_normal((n, n))
+    if unevenness == 0:
+        return Cloth(np.zeros((n, n)))
+    # Rice: a line through noise filtered by a Gaussian of sigma s has one crossing up per 2 pi sqrt(2) s
+    surface = gaussian_filter(noise, wavelength / (2 * np.pi * np.sqrt(2)) / GRID, mode="wrap")
+    hem = round(HEM / GRID)
+    inner = surface[hem:-hem, hem:-hem]
+    surface = (surface - inner.mean()) * (unevenness / inner.std())
+    edge = np.minimum(np.arange(n), np.arange(n)[::-1]) / hem
+    ramp = np.clip(edge, 0, 1)
+    surface = (surface - surface.min()) * np.minimum.outer(ramp, ramp)
+    return Cloth(surface)
+
+
+def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
+    """Lay the cloth on the table as geom "cloth"; a flat one is the table itself, with a coloured sheet."""
+    top = float(cloth.elevation.max())
+    if top == 0:
+        spec.worldbody.add_geom(
+            name="cloth",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[HALF_EXTENT, HALF_EXTENT, 0.001],
+            pos=[*WORKSPACE_CENTRE, -0.001 + 2e-5],  # a hair above the table, for the renderer
+            rgba=list(RGBA),
+            contype=0,
+            conaffinity=0,
+        )
+        return
+    n = len(cloth.elevation)
+    spec.add_hfield(
+        name="cloth",
+        nrow=n,
+        ncol=n,
+        size=[HALF_EXTENT, HALF_EXTENT, top, 0.005],
+        userdata=(cloth.elevation / top).ravel(),
+    )
+    spec.worldbody.add_geom(
+        name="cloth",
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname="cloth",
+        pos=[*WORKSPACE_CENTRE, 0.0],
+        rgba=list(RGBA),
+    )

@@ -1,0 +1,58 @@
+"""The real command, headless, once with each camera: oracle and MP-PC on the thin suite."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mpgrasp.camera.wrist_camera import WristCamera
+from mpgrasp.exceptions import CameraError
+from mpgrasp.scene.scene import build_scene
+from mpgrasp.suite import load_suite
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+COMMAND = [sys.executable, "-m", "mpgrasp.bench", "thin", "--detector", "oracle", "--controller", "mppc"]
+
+
+def play(out: Path, *options: str) -> dict[str, Any]:
+    """One real episode; returns its line."""
+    command = [*COMMAND, "--episodes", "1", "--out", str(out), *options]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    (line,) = (out / "episodes.jsonl").read_text().splitlines()
+    return json.loads(line)
+
+
+@pytest.mark.parametrize("camera", ["ray", "gl"])
+def test_one_real_episode_leaves_a_whole_run(camera: str, tmp_path: Path) -> None:
+    if camera == "gl":
+        try:
+            WristCamera(build_scene(load_suite("thin").scene, 0).model, backend="gl").close()
+        except CameraError as error:
+            pytest.skip(f"no OpenGL here: {error}")
+    line = play(tmp_path / "a", "--camera", camera, "--record", "1")
+    assert line["object"] == "usb_stick"
+    assert line["ticks"] > 0
+    assert set(line["timing"]) >= {"render", "detect", "control", "ik", "physics"}
+    run = json.loads((tmp_path / "a" / "run.json").read_text())
+    assert run["camera"]["backend"] == camera
+    assert run["physics"]["timestep"] == 0.002
+    assert json.loads((tmp_path / "a" / "summary.json").read_text())["complete"]
+    recordings = list((tmp_path / "a" / "recordings").iterdir())
+    assert {".rrd", ".gif"} <= {file.suffix for file in recordings}
+    assert all(file.stat().st_size > 1000 for file in recordings)
+
+
+def test_the_same_seed_plays_the_same_episode_in_any_process_and_unrecorded(tmp_path: Path) -> None:
+    options = ["--camera", "ray", "--seed", "1"]
+    first = play(tmp_path / "a", *options, "--record", "1")
+    second = play(tmp_path / "b", *options, "--workers", "2", "--quiet")
+    del first["timing"], second["timing"]
+    assert first == second
