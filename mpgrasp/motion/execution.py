@@ -21,7 +21,7 @@ from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.protocols import Driver
 from mpgrasp.motion.reflex import Reflex
 from mpgrasp.motion.trajectory import nearest_yaw, shake
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand
 
 PHASES = ("pregrasp", "descend", "close", "lift", "hold", "shake")
 OUTCOMES = ("success", "reflex", "collision", "missed", "slipped")
@@ -140,7 +140,7 @@ class Execution:
 
     def _pregrasp(self) -> None:
         c = self.config
-        self.simulation.open_gripper(min(self.grasp.width + c.opening_margin, panda.GRIPPER_MAX_WIDTH))
+        self.simulation.open_gripper(min(self.grasp.width + c.opening_margin, hand.GRIPPER_MAX_WIDTH))
         target = self._pose(float(self.grasp.position[2]) + c.approach)
         missing = float(target[2, 3] - self.driver.T_desired[2, 3])
         if missing > 1e-3:
@@ -157,7 +157,7 @@ class Execution:
             (self.planned, c.guarded_speed),
         )
         for tip, speed in stages:
-            target = self._pose(tip + panda.FINGERTIP_BEYOND_TCP)
+            target = self._pose(tip + hand.FINGERTIP_BEYOND_TCP)
             if target[2, 3] >= self.driver.T_desired[2, 3]:
                 continue
             reached = self._move(target, speed, until=lambda: self.driver.touch > c.contact_threshold)
@@ -170,7 +170,7 @@ class Execution:
         c = self.config
         self.contact_height = self._tip()
         # the desired pose lies below the felt contact by what the servo gave way
-        free = self.contact_height + panda.FINGERTIP_BEYOND_TCP + c.back_off
+        free = self.contact_height + hand.FINGERTIP_BEYOND_TCP + c.back_off
         self._rise(max(0.0, free - self.driver.T_desired[2, 3]), c.guarded_speed)
 
     def _close(self) -> None:
@@ -249,7 +249,7 @@ class Execution:
             self._on_tick(self.phase)
 
     def _tip(self) -> float:
-        return float(self.simulation.T_world_tcp[2, 3]) - panda.FINGERTIP_BEYOND_TCP
+        return float(self.simulation.T_world_tcp[2, 3]) - hand.FINGERTIP_BEYOND_TCP
 
     def _height(self, name: str) -> float:
         return float(self.simulation.object_pose(name)[2, 3])

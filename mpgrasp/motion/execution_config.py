@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class ExecutionConfig:
     """Deepest reach of the tips below the seen surface [m]; the palm is 45 mm above them."""
     overtravel: float = 0.002
     """How far below the table's plane the search for contact may go [m]."""
-    grip_force: float = panda.GRIPPER_FORCE_DEFAULT
+    grip_force: float = hand.GRIPPER_FORCE_DEFAULT
     """Of each pad [N]."""
     settle_time: float = 2.5
     """Longest wait for the gripper to come to rest [s]."""
@@ -80,9 +80,9 @@ class ExecutionConfig:
                 raise ConfigError(f"{name} must be positive", got=0)
         if self.success_height >= self.lift:
             raise ConfigError("success_height must be less than the lift", got=self.success_height)
-        if not panda.GRIPPER_FORCE_MIN <= self.grip_force <= panda.GRIPPER_FORCE_MAX:
+        if not hand.GRIPPER_FORCE_MIN <= self.grip_force <= hand.GRIPPER_FORCE_MAX:
             raise ConfigError(
                 "grip force out of range",
                 got=self.grip_force,
-                allowed=f"{panda.GRIPPER_FORCE_MIN} to {panda.GRIPPER_FORCE_MAX} N",
+                allowed=f"{hand.GRIPPER_FORCE_MIN} to {hand.GRIPPER_FORCE_MAX} N",
             )

@@ -17,7 +17,7 @@ from mpgrasp.motion.execution import Execution, check_finite
 from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.hand_driver import HandDriver
 from mpgrasp.motion.trajectory import nearest_yaw
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand
 from mpgrasp.scene.free_hand import FreeGripper
 from mpgrasp.scene.scene import Scene
 
@@ -88,9 +88,9 @@ class _Trial(Execution):
 
     def _pregrasp(self) -> None:
         c = self.config
-        width = float(np.clip(self.grasp.width + c.opening_margin, 0.0, panda.GRIPPER_MAX_WIDTH))
+        width = float(np.clip(self.grasp.width + c.opening_margin, 0.0, hand.GRIPPER_MAX_WIDTH))
         ready = float(self.grasp.position[2]) + c.approach
-        free = self._lowest_free(max(ready, self._hand.top + panda.FINGERTIP_BEYOND_TCP), width)
+        free = self._lowest_free(max(ready, self._hand.top + hand.FINGERTIP_BEYOND_TCP), width)
         above = free > ready
         self._place(free + self._run_up(c.approach_speed if above else c.descent_speed), width)
         if above:
@@ -98,7 +98,7 @@ class _Trial(Execution):
 
     def _lowest_free(self, z: float, width: float) -> float:
         """How far down from z the hand can come without touching anything."""
-        bottom = self.planned + panda.FINGERTIP_BEYOND_TCP
+        bottom = self.planned + hand.FINGERTIP_BEYOND_TCP
         while z > bottom:
             self._place(z - SCAN_STEP, width)
             if self._hand.touches():

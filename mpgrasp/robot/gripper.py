@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand, panda
 
 
 class GripperDrive:
@@ -28,7 +28,7 @@ class GripperDrive:
         self._dt = float(model.opt.timestep)
         self.force: float | None = None
         """Of each pad while grasping [N]; None while the gripper holds a width."""
-        self.target = panda.GRIPPER_MAX_WIDTH
+        self.target = hand.GRIPPER_MAX_WIDTH
         """Commanded opening [m]."""
 
     @property
@@ -44,21 +44,21 @@ class GripperDrive:
         self.open(width)
 
     def open(self, width: float) -> None:
-        """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at the hand's limits."""
+        """Move to an opening [m], wider or narrower, at `hand.GRIPPER_SPEED`; cut at the hand's limits."""
         self.force = None
-        self.target = float(np.clip(width, 0.0, panda.GRIPPER_MAX_WIDTH))
+        self.target = float(np.clip(width, 0.0, hand.GRIPPER_MAX_WIDTH))
 
     def close(self, force: float) -> None:
-        """Close at `panda.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
+        """Close at `hand.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
 
         Raises:
             ConfigError: a force that the hand cannot hold continuously.
         """
-        if not panda.GRIPPER_FORCE_MIN <= force <= panda.GRIPPER_FORCE_MAX:
+        if not hand.GRIPPER_FORCE_MIN <= force <= hand.GRIPPER_FORCE_MAX:
             raise ConfigError(
                 "grip force out of range",
                 got=force,
-                allowed=f"{panda.GRIPPER_FORCE_MIN} to {panda.GRIPPER_FORCE_MAX} N",
+                allowed=f"{hand.GRIPPER_FORCE_MIN} to {hand.GRIPPER_FORCE_MAX} N",
             )
         self.force = float(force)
 
@@ -66,10 +66,10 @@ class GripperDrive:
         """Set the servo's reference for the next time step."""
         reference = float(self._ctrl[0])
         if self.force is None:
-            limit = panda.GRIPPER_SPEED * self._dt
+            limit = hand.GRIPPER_SPEED * self._dt
             reference += min(max(self.target - reference, -limit), limit)
         else:
             # The servo pulls with its stiffness times the lag: let it lag by the force asked for.
             floor = self.width - self.force / self._stiffness
-            reference = max(reference - panda.GRIPPER_CLOSE_SPEED * self._dt, floor)
+            reference = max(reference - hand.GRIPPER_CLOSE_SPEED * self._dt, floor)
         self._ctrl[0] = reference

@@ -16,6 +16,7 @@ import numpy as np
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.paths import PANDA_ASSETS
+from mpgrasp.robot import hand
 
 PREFIX = "panda/"
 """Where the robot is attached to a world, its elements carry this prefix."""
@@ -47,26 +48,6 @@ TORQUE_MAX = _constant(87, 87, 87, 87, 12, 12, 12)
 CARTESIAN_SPEED_MAX = 1.7
 """Translation of the tool [m/s]."""
 
-TCP_OFFSET = 0.1034
-"""From the hand frame to the tool point, along the approach axis [m]."""
-FINGERTIP_BEYOND_TCP = 0.0087
-"""From the tool point to the finger tips, along the approach axis [m]."""
-FINGER_WIDTH = 0.0176
-"""Width of a finger tip across the closing direction [m]."""
-FINGER_THICKNESS = 0.0144
-"""Thickness of a finger tip along the closing direction [m]."""
-GRIPPER_MAX_WIDTH = 0.08
-"""Opening between the pads [m]."""
-GRIPPER_SPEED = 0.1
-"""Speed at which the opening follows a commanded width: 0.05 m/s for each finger [m/s]."""
-GRIPPER_CLOSE_SPEED = 0.05
-"""Speed at which the opening shrinks while grasping [m/s]."""
-GRIPPER_FORCE_MIN = 30.0
-"""Smallest continuous force of each pad [N]."""
-GRIPPER_FORCE_MAX = 70.0
-"""Largest continuous force of each pad [N]."""
-GRIPPER_FORCE_DEFAULT = 40.0
-"""Force of each pad unless told otherwise [N]."""
 
 _DESCRIPTION = Path("share/example-robot-data/robots/panda_description/meshes/collision")
 
@@ -118,9 +99,9 @@ def set_home(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         data.ctrl[model.actuator(PREFIX + name).id] = value
     for name in FINGER_JOINTS:
         joint = model.joint(PREFIX + name)
-        data.qpos[joint.qposadr] = GRIPPER_MAX_WIDTH / 2
+        data.qpos[joint.qposadr] = hand.GRIPPER_MAX_WIDTH / 2
         data.qvel[joint.dofadr] = 0.0
-    data.ctrl[model.actuator(PREFIX + "gripper").id] = GRIPPER_MAX_WIDTH
+    data.ctrl[model.actuator(PREFIX + "gripper").id] = hand.GRIPPER_MAX_WIDTH
 
 
 def arm_model() -> mujoco.MjModel:
@@ -134,7 +115,7 @@ def arm_model() -> mujoco.MjModel:
         spec.delete(element)
     for name, joint, side in zip(("left_finger", "right_finger"), FINGER_JOINTS, (1, -1), strict=True):
         finger = spec.body(name)
-        finger.pos[1] += side * GRIPPER_MAX_WIDTH / 2
+        finger.pos[1] += side * hand.GRIPPER_MAX_WIDTH / 2
         spec.delete(spec.joint(joint))
     spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.01])
     return spec.compile()

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down, transform
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand, panda
 from mpgrasp.robot.contacts import Contacts
 from mpgrasp.robot.gripper import GripperDrive
 from mpgrasp.scene.objects.model import OBJECT_GROUP
@@ -45,17 +45,17 @@ def add_free_hand(spec: mujoco.MjSpec) -> None:
     At zero the tool point lies in the world's origin and `T_world_tcp` is `looking_down((0, 0, 0))`.
     """
     arm = panda.panda_spec()
-    hand = spec.worldbody.add_frame().attach_body(arm.body("hand"), panda.PREFIX, "")
+    root = spec.worldbody.add_frame().attach_body(arm.body("hand"), panda.PREFIX, "")
     for mesh in list(spec.meshes):
         if mesh.name.startswith(panda.PREFIX + "link"):
             spec.delete(mesh)
-    hand.pos = [0.0, 0.0, panda.TCP_OFFSET]
-    hand.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # instead of the Euler angles on the arm
-    hand.quat = [0.0, 1.0, 0.0, 0.0]
-    own = _own_inertia(hand)
+    root.pos = [0.0, 0.0, hand.TCP_OFFSET]
+    root.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # instead of the Euler angles on the arm
+    root.quat = [0.0, 1.0, 0.0, 0.0]
+    own = _own_inertia(root)
     for k, (name, axis) in enumerate(zip(JOINTS, _AXES, strict=True)):
         slide = k < 3
-        hand.add_joint(
+        root.add_joint(
             name=panda.PREFIX + name,
             type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
             axis=axis,
@@ -107,7 +107,7 @@ class FreeGripper:
         mujoco.mj_resetData(self.model, self.data)
         self._stale = True
         self._force: FloatArray = np.zeros(3)
-        self.place([0.0, 0.0, 1.0], 0.0, panda.GRIPPER_MAX_WIDTH)
+        self.place([0.0, 0.0, 1.0], 0.0, hand.GRIPPER_MAX_WIDTH)
 
     def place(self, position: ArrayLike, yaw: float, width: float) -> None:
         """Teleport the hand: tool point (3,) [m], heading [rad] and opening [m], at rest; it stays there."""
@@ -178,11 +178,11 @@ class FreeGripper:
         """Opening between the pads [m]."""
         return self._gripper.width
 
-    def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
+    def open_gripper(self, width: float = hand.GRIPPER_MAX_WIDTH) -> None:
         """As `Simulation.open_gripper`."""
         self._gripper.open(width)
 
-    def close_gripper(self, force: float = panda.GRIPPER_FORCE_DEFAULT) -> None:
+    def close_gripper(self, force: float = hand.GRIPPER_FORCE_DEFAULT) -> None:
         """As `Simulation.close_gripper`.
 
         Raises:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand, panda
 from mpgrasp.robot.contacts import Contacts
 from mpgrasp.robot.gripper import GripperDrive
 
@@ -77,7 +77,7 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, self.scene.state, _STATE)
         panda.set_home(self.model, self.data)
-        self._gripper.open(panda.GRIPPER_MAX_WIDTH)
+        self._gripper.open(hand.GRIPPER_MAX_WIDTH)
         self._contact_torque: FloatArray = np.zeros(7)
         self.set_q(panda.Q_HOME)
 
@@ -156,12 +156,12 @@ class Simulation:
         """Opening between the pads [m]."""
         return self._gripper.width
 
-    def open_gripper(self, width: float = panda.GRIPPER_MAX_WIDTH) -> None:
-        """Move to an opening [m], wider or narrower, at `panda.GRIPPER_SPEED`; cut at the hand's limits."""
+    def open_gripper(self, width: float = hand.GRIPPER_MAX_WIDTH) -> None:
+        """Move to an opening [m], wider or narrower, at `hand.GRIPPER_SPEED`; cut at the hand's limits."""
         self._gripper.open(width)
 
-    def close_gripper(self, force: float = panda.GRIPPER_FORCE_DEFAULT) -> None:
-        """Close at `panda.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
+    def close_gripper(self, force: float = hand.GRIPPER_FORCE_DEFAULT) -> None:
+        """Close at `hand.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
 
         Raises:
             ConfigError: a force that the hand cannot hold continuously.

@@ -11,7 +11,7 @@ import pytest
 
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.geometry import FloatArray, invert, rotation_x, rotation_z, transform, transform_points
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand, panda
 
 # a [m], d [m], alpha [rad] of joints 1..7 and the flange, modified (Craig) convention, from the FER's manual
 DH = (
@@ -122,11 +122,11 @@ def test_finger_tips_are_the_real_ones(arm: mujoco.MjModel) -> None:
     for name, side in (("left_pad", 1), ("right_pad", -1)):
         corners = np.array(list(itertools.product((-1, 1), repeat=3))) * arm.geom(name).size
         points = transform_points(invert(T_tcp) @ pose(data, "geom", name), corners)
-        assert np.ptp(points[:, 0]) == pytest.approx(panda.FINGER_WIDTH)
-        assert np.ptp(points[:, 1]) == pytest.approx(panda.FINGER_THICKNESS)
-        assert points[:, 2].max() == pytest.approx(panda.FINGERTIP_BEYOND_TCP)
-        assert panda.TCP_OFFSET + points[:, 2].max() == pytest.approx(0.1121)
-        assert np.abs(points[:, 1]).min() == pytest.approx(panda.GRIPPER_MAX_WIDTH / 2)
+        assert np.ptp(points[:, 0]) == pytest.approx(hand.FINGER_WIDTH)
+        assert np.ptp(points[:, 1]) == pytest.approx(hand.FINGER_THICKNESS)
+        assert points[:, 2].max() == pytest.approx(hand.FINGERTIP_BEYOND_TCP)
+        assert hand.TCP_OFFSET + points[:, 2].max() == pytest.approx(0.1121)
+        assert np.abs(points[:, 1]).min() == pytest.approx(hand.GRIPPER_MAX_WIDTH / 2)
         assert (np.sign(points[:, 1]) == side).all()
 
 
@@ -150,7 +150,7 @@ def test_arm_model_has_seven_joints_and_open_fingers(arm: mujoco.MjModel) -> Non
     assert arm.nu == 0
     data = at(arm, panda.Q_HOME)
     gap = data.body("left_finger").xpos - data.body("right_finger").xpos
-    assert np.linalg.norm(gap) == pytest.approx(panda.GRIPPER_MAX_WIDTH)
+    assert np.linalg.norm(gap) == pytest.approx(hand.GRIPPER_MAX_WIDTH)
 
 
 def test_collision_pairs_name_geoms_of_the_arm_model(arm: mujoco.MjModel, robot: mujoco.MjModel) -> None:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from mpgrasp.scene.config import SceneConfig
-from mpgrasp.workspace import WORKSPACE_CENTRE
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
 from mpgrasp.motion.ik import solve_pose
+from mpgrasp.robot import hand as franka_hand
 from mpgrasp.robot import panda
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.free_hand import DAMPING, INERTIA, STIFFNESS, FreeGripper
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 CONFIG = SceneConfig(objects=("usb_stick", "soap"))
 HAND_GEOMS = (
@@ -54,7 +55,7 @@ def geoms_in_tool_frame(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str,
 
 
 def test_every_part_of_the_hand_is_where_the_arm_carries_it(hand: FreeGripper, arm: Simulation) -> None:
-    hand.place([0.4, 0.1, 0.2], 0.7, panda.GRIPPER_MAX_WIDTH)
+    hand.place([0.4, 0.1, 0.2], 0.7, franka_hand.GRIPPER_MAX_WIDTH)
     mine, its = geoms_in_tool_frame(hand.model, hand.data), geoms_in_tool_frame(arm.model, arm.data)
     assert set(mine) == set(its) == {panda.PREFIX + name for name in HAND_GEOMS}
     for name, expected in its.items():
@@ -116,7 +117,7 @@ def test_a_steady_force_bends_the_servo_by_its_stiffness(hand: FreeGripper, axis
 
 
 def test_pressing_on_the_table_is_felt_as_an_upward_force(hand: FreeGripper) -> None:
-    spot = np.array([0.75, 0.4, panda.FINGERTIP_BEYOND_TCP])  # beside the objects
+    spot = np.array([0.75, 0.4, franka_hand.FINGERTIP_BEYOND_TCP])  # beside the objects
     up = np.array([0.0, 0.0, 1.0])
     hand.place(spot + 0.01 * up, 0.0, 0.0)
     for k in range(100):
@@ -131,7 +132,7 @@ def test_only_overlap_with_something_is_a_touch(hand: FreeGripper) -> None:
     hand.place([x, y, z + 0.05], 0.0, 0.0)
     assert not hand.touches()
     # closed fingers touch each other, and that does not count
-    hand.place([x, y, z + panda.FINGERTIP_BEYOND_TCP], 0.0, 0.0)
+    hand.place([x, y, z + franka_hand.FINGERTIP_BEYOND_TCP], 0.0, 0.0)
     assert hand.touches()
 
 

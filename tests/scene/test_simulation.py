@@ -12,7 +12,7 @@ import pytest
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, invert, looking_down, rotation_vector
 from mpgrasp.paths import SCENES
-from mpgrasp.robot import panda
+from mpgrasp.robot import hand, panda
 from mpgrasp.scene.objects.model import SOLIMP, SOLREF
 from mpgrasp.scene.simulation import SERVO_PERIOD, Simulation
 
@@ -96,10 +96,10 @@ def travel(
 
 def grasp(sim: Simulation, size: tuple[float, float, float], force: float, offset: float = 0.0) -> None:
     """Grasp the box at the centre, tips 1.5 mm above the table or TCP at half height, and lift it 0.1 m."""
-    low = np.array([CENTRE[0], CENTRE[1] + offset, max(size[2] / 2, panda.FINGERTIP_BEYOND_TCP + 0.0015)])
+    low = np.array([CENTRE[0], CENTRE[1] + offset, max(size[2] / 2, hand.FINGERTIP_BEYOND_TCP + 0.0015)])
     high = low + np.array([0, 0, 0.1])
     q = put(sim, *high)
-    sim.open_gripper(min(panda.GRIPPER_MAX_WIDTH, size[1] + 0.02))
+    sim.open_gripper(min(hand.GRIPPER_MAX_WIDTH, size[1] + 0.02))
     sim.step(400)
     q, _ = travel(sim, q, high, low, 0.1)
     sim.close_gripper(force)
@@ -114,7 +114,7 @@ SIZES = [(0.06, 0.03, 0.04), (0.06, 0.008, 0.008), (0.06, 0.0045, 0.0045), (0.06
 @pytest.mark.parametrize("offset", [0.0, 0.004])
 def test_box_is_lifted_whatever_its_thickness(size: tuple[float, float, float], offset: float) -> None:
     sim = Simulation(box_scene(size, mass=0.02))
-    grasp(sim, size, panda.GRIPPER_FORCE_DEFAULT, offset)
+    grasp(sim, size, hand.GRIPPER_FORCE_DEFAULT, offset)
     assert sim.object_pose("box_0")[2, 3] == pytest.approx(size[2] / 2 + 0.1, abs=0.004)
     assert sim.pad_contacts() == ({"box_0"}, {"box_0"})
     assert sim.gripper_width == pytest.approx(size[1], abs=0.0005)
@@ -170,8 +170,8 @@ def test_gripper_opens_to_the_commanded_width_at_a_realistic_speed(width: float)
     for _ in range(100):
         sim.step(5)
         widths.append(sim.gripper_width)
-    assert widths[-1] == pytest.approx(min(width, panda.GRIPPER_MAX_WIDTH), abs=1e-5)
-    assert np.abs(np.diff(widths)).max() / 0.01 < 1.05 * panda.GRIPPER_SPEED
+    assert widths[-1] == pytest.approx(min(width, hand.GRIPPER_MAX_WIDTH), abs=1e-5)
+    assert np.abs(np.diff(widths)).max() / 0.01 < 1.05 * hand.GRIPPER_SPEED
 
 
 @pytest.mark.parametrize("force", [0.0, 29.0, 71.0, float("nan")])
@@ -323,7 +323,7 @@ def test_reset_returns_to_the_scene() -> None:
     assert sim.state_hash() == fresh
     assert sim.time == 0
     np.testing.assert_array_equal(sim.q, panda.Q_HOME)
-    assert sim.gripper_width == pytest.approx(panda.GRIPPER_MAX_WIDTH)
+    assert sim.gripper_width == pytest.approx(hand.GRIPPER_MAX_WIDTH)
 
 
 def test_poses_belong_to_the_present_joint_positions() -> None:
@@ -349,7 +349,7 @@ def test_unknown_object_is_refused_with_the_known_ones() -> None:
 def test_a_tip_that_stands_on_an_object_does_not_hold_it() -> None:
     size = (0.06, 0.07, 0.03)
     sim = Simulation(box_scene(size, mass=0.2))
-    above = np.array([CENTRE[0], CENTRE[1], size[2] + panda.FINGERTIP_BEYOND_TCP + 0.02])
+    above = np.array([CENTRE[0], CENTRE[1], size[2] + hand.FINGERTIP_BEYOND_TCP + 0.02])
     q = put(sim, *above)
     sim.open_gripper(0.03)
     sim.step(400)
