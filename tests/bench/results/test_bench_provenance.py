@@ -18,7 +18,10 @@ from mpgrasp.bench.playing.player import Player
 from mpgrasp.bench.results.provenance import PACKAGES, provenance
 from mpgrasp.files.json_values import plain
 
-INCONSEQUENTIAL = {"gymnasium", "lazy-loader", "matplotlib", "pillow", "rerun-sdk", "rich", "safetensors"}
+INCONSEQUENTIAL = {
+    "gymnasium", "imageio", "jinja2", "lazy-loader", "matplotlib", "msgspec", "pillow", "platformdirs", "rerun-sdk",
+    "rich", "safetensors",
+}  # fmt: skip
 """Dependencies that draw, store or wrap, and compute nothing of an episode."""
 
 
