@@ -9,7 +9,6 @@ import re
 import runpy
 import shlex
 import warnings
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,14 +17,12 @@ import numpy as np
 import pytest
 
 from mpgrasp.bench.__main__ import SUBCOMMANDS
-from mpgrasp.bench.analysis.summary import paired_tests, summarise
 from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
 from mpgrasp.bench.playing.programme import PROGRAMMES
 from mpgrasp.camera.wrist_camera import D435_INTRINSICS
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.networks.registry import NETWORKS, RUNTIMES
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.json_values import plain
 from mpgrasp.geometry import looking_down
 from mpgrasp.plugins import controller_names, detector_names
 from mpgrasp.suite import suite_names
@@ -253,39 +250,3 @@ def test_a_cell_that_two_published_runs_have_played_is_refused(
     (tmp_path / "b" / "summary.json").write_text(json.dumps({"complete": True, "cells": [{**cell, "n": 2}]}))
     with pytest.raises(ConfigError, match=r"two runs have played thin/oracle/mppc; got \['a', 'b'\]"):
         table.table()
-
-
-def assert_alike(ours: Any, published: Any, where: str = "") -> None:
-    """The same JSON but for the last bits of floats."""
-    if isinstance(ours, dict) and isinstance(published, dict):
-        assert list(ours) == list(published), where
-        for key, value in ours.items():
-            assert_alike(value, published[key], f"{where}.{key}")
-    elif isinstance(ours, list) and isinstance(published, list):
-        assert len(ours) == len(published), where
-        for k, (one, other) in enumerate(zip(ours, published, strict=True)):
-            assert_alike(one, other, f"{where}.{k}")
-    elif isinstance(ours, float) and published is not None:
-        assert published == pytest.approx(ours, rel=1e-6), where
-    else:
-        assert ours == published, where
-
-
-@pytest.mark.parametrize("path", sorted(RESULTS.rglob("summary.json")), ids=lambda p: p.parent.name)
-def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
-    lines = [json.loads(line) for line in (path.parent / "episodes.jsonl").read_text().splitlines()]
-    run = json.loads((path.parent / "run.json").read_text())
-    assert run["command"].startswith("python -m mpgrasp.bench")
-    assert re.fullmatch(r"[0-9a-f]{40}", run["made_with"]["git"]["commit"])
-    summary = json.loads(path.read_text())
-    for key, found in (("cells", summarise(lines)), ("paired_tests", paired_tests(lines))):
-        assert_alike(plain(found), summary[key], key)
-    which = ("suite", "detector", "controller")
-    played = [line for line in lines if line["outcome"] != "error"]
-    counts = Counter(tuple(line[key] for key in which) for line in played)
-    successes = Counter(tuple(line[key] for key in which) for line in played if line["success"])
-    worlds = {(*(line[key] for key in which), line["scene_seed"]) for line in played}
-    assert len(worlds) == len(played)
-    cells = {tuple(cell[key] for key in which): cell for cell in summary["cells"]}
-    assert {key: cell["n"] for key, cell in cells.items() if cell["n"]} == counts
-    assert {key: cell["successes"] for key, cell in cells.items() if cell["successes"]} == successes

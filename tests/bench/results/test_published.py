@@ -1,14 +1,21 @@
-"""What benchmarks/results/ publishes must come from what ships."""
+"""What benchmarks/results/ publishes is complete, of a known commit and from what ships; no more is there."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
+import shutil
+import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from mpgrasp.bench.analysis.summary import paired_tests, summarise
+from mpgrasp.files.json_values import plain
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -16,6 +23,26 @@ SHIPPED = {
     path.stem: hashlib.sha256(path.read_bytes()).hexdigest()
     for path in (ROOT / "assets" / "weights").glob("*.safetensors")
 }
+RUNS = sorted(RESULTS.rglob("run.json"))
+EPISODES = {"run.json", "episodes.jsonl", "summary.json", "report.md"}
+"""Files of a run of the benchmark."""
+_MODIFIED = "played from a modified checkout; to be played again with the next change of the controllers"
+STALE = {
+    "ablation-architecture": _MODIFIED,
+    "ablation-fusion": _MODIFIED,
+    "run-time": _MODIFIED,
+    "thickness": _MODIFIED,
+    "unseen-thin": _MODIFIED,
+    "without-gl/thin-dhrnet-mppc": _MODIFIED,
+}
+"""Runs that no commit tells exactly, with the reason why they are still published."""
+
+
+def folder_of(path: Path) -> str:
+    return path.parent.relative_to(RESULTS).as_posix()
+
+
+EVERY_RUN = pytest.mark.parametrize("path", RUNS, ids=folder_of)
 
 
 def digests(value: Any) -> Iterator[tuple[str, str]]:
@@ -33,10 +60,28 @@ def digests(value: Any) -> Iterator[tuple[str, str]]:
             yield from digests(item)
 
 
-RUNS = sorted(RESULTS.rglob("run.json"))
+def tracked(pattern: str) -> list[Path]:
+    """Files of the repository that match, relative to its root; skips the test outside of a checkout."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("no git checkout")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--", pattern], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    return [Path(name) for name in listed.stdout.split("\0") if name]
 
 
-@pytest.mark.parametrize("path", RUNS, ids=lambda path: path.parent.name)
+def wanted_files(folder: Path) -> set[str]:
+    """Names of the files that a published folder consists of."""
+    if folder.name == "training":
+        return {f"{network}.{kind}" for network in SHIPPED for kind in ("csv", "png")}
+    if folder.name == "paper":  # the report on several runs
+        return {"report.md"}
+    if (ROOT / folder / "episodes.jsonl").exists():
+        return EPISODES
+    return {"run.json", *(f"{folder.name}.{kind}" for kind in ("json", "csv", "png"))}
+
+
+@EVERY_RUN
 def test_a_published_result_is_one_of_the_shipped_weights(path: Path) -> None:
     for name, digest in digests(json.loads(path.read_text(encoding="utf-8"))):
         assert digest == SHIPPED[name], f"{path.parent.name} was made with other weights of {name}"
@@ -47,8 +92,66 @@ def test_most_published_results_tell_their_weights() -> None:
     assert told >= set(SHIPPED)
 
 
-@pytest.mark.parametrize("path", sorted(RESULTS.glob("**/episodes.jsonl")), ids=lambda p: p.parent.name)
+@pytest.mark.parametrize("path", sorted(RESULTS.glob("**/episodes.jsonl")), ids=folder_of)
 def test_the_command_of_a_published_run_makes_the_folder_it_lies_in(path: Path) -> None:
     command = json.loads((path.parent / "run.json").read_text(encoding="utf-8"))["command"].split()
+    assert command[:3] == ["python", "-m", "mpgrasp.bench"]
     out = ROOT / command[command.index("--out") + 1]
     assert out == path.parent
+
+
+@EVERY_RUN
+def test_a_published_run_is_of_a_commit_as_it_stands(path: Path) -> None:
+    git = json.loads(path.read_text(encoding="utf-8"))["made_with"]["git"]
+    assert re.fullmatch(r"[0-9a-f]{40}", git["commit"])
+    assert git["modified"] is (folder_of(path) in STALE), "publish runs from a clean checkout"
+
+
+def test_every_stale_run_is_still_published() -> None:
+    assert STALE.keys() <= {folder_of(path) for path in RUNS}
+
+
+def test_a_published_folder_holds_its_files_and_no_others() -> None:
+    found: dict[Path, set[str]] = {}
+    for path in tracked("benchmarks/results"):
+        found.setdefault(path.parent, set()).add(path.name)
+    assert found
+    assert found == {folder: wanted_files(folder) for folder in found}
+
+
+def test_no_arrays_are_in_the_repository() -> None:
+    assert tracked("*.npz") == []
+
+
+def assert_alike(ours: Any, published: Any, where: str = "") -> None:
+    """Raise unless both are the same JSON but for the last bits of floats."""
+    if isinstance(ours, dict) and isinstance(published, dict):
+        assert list(ours) == list(published), where
+        for key, value in ours.items():
+            assert_alike(value, published[key], f"{where}.{key}")
+    elif isinstance(ours, list) and isinstance(published, list):
+        assert len(ours) == len(published), where
+        for k, (one, other) in enumerate(zip(ours, published, strict=True)):
+            assert_alike(one, other, f"{where}.{k}")
+    elif isinstance(ours, float) and published is not None:
+        assert published == pytest.approx(ours, rel=1e-6), where
+    else:
+        assert ours == published, where
+
+
+@pytest.mark.parametrize("path", sorted(RESULTS.rglob("summary.json")), ids=folder_of)
+def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
+    text = (path.parent / "episodes.jsonl").read_text(encoding="utf-8")
+    lines = [json.loads(line) for line in text.splitlines()]
+    summary = json.loads(path.read_text(encoding="utf-8"))
+    for key, found in (("cells", summarise(lines)), ("paired_tests", paired_tests(lines))):
+        assert_alike(plain(found), summary[key], key)
+    which = ("suite", "detector", "controller")
+    played = [line for line in lines if line["outcome"] != "error"]
+    counts = Counter(tuple(line[key] for key in which) for line in played)
+    successes = Counter(tuple(line[key] for key in which) for line in played if line["success"])
+    worlds = {(*(line[key] for key in which), line["scene_seed"]) for line in played}
+    assert len(worlds) == len(played)
+    cells = {tuple(cell[key] for key in which): cell for cell in summary["cells"]}
+    assert {key: cell["n"] for key, cell in cells.items() if cell["n"]} == counts
+    assert {key: cell["successes"] for key, cell in cells.items() if cell["successes"]} == successes
