@@ -1,6 +1,7 @@
-"""`python benchmarks/table.py`: the results table of the README, from the summaries in benchmarks/results/.
+"""`python benchmarks/table.py`: the tables of suites, from the summaries in benchmarks/results/.
 
-`--write` puts it between the two markers in README.md; a test holds that both say the same.
+`--write` puts them between the two markers of their documents: the paper's suites into README.md, all others
+into docs/results.md. A test holds that documents and summaries say the same.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from mpgrasp.exceptions import ConfigError
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 BEGIN, END = "<!-- results: python benchmarks/table.py --write -->", "<!-- end of results -->"
-SUITES = ("single", "single-ycb", "unseen", "thin", "thin_variants", "stacked")
-"""Order of the columns; other suites come after these."""
+PAPER = ("single", "unseen", "thin", "stacked")
+"""Suites of the paper's tables, in their order."""
+DOCUMENTS = {"README.md": True, "docs/results.md": False}
+"""Where the tables stand, and whether the paper's suites are in them or all others."""
 DETECTORS = ("oracle", "dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
 """Order of the rows; other detectors come after these."""
 NOT_PLAYED = ""
@@ -45,10 +48,15 @@ def cells() -> list[dict]:
     return found
 
 
-def table() -> str:
-    """The whole Markdown table: a row per detector and controller, a column per suite, two per clearing."""
-    by_key = {(c["detector"], c["controller"], c["suite"]): c for c in cells()}
-    suites = sorted({suite for *_, suite in by_key}, key=lambda name: (_rank(name, SUITES), name))
+def table(*, paper: bool) -> str:
+    """Return the Markdown table of the paper's suites, or of all others.
+
+    It has a row per detector and controller and a column per suite, two where tables are cleared.
+    """
+    by_key = {
+        (c["detector"], c["controller"], c["suite"]): c for c in cells() if (c["suite"] in PAPER) is paper
+    }
+    suites = sorted({suite for *_, suite in by_key}, key=lambda name: (_rank(name, PAPER), name))
     methods = sorted({key[:2] for key in by_key}, key=lambda m: (_rank(m[0], DETECTORS), *m))
     clearing = {
         suite for *_, suite in by_key if any(c["clearing"] for k, c in by_key.items() if k[2] == suite)
@@ -91,17 +99,18 @@ def _line(*values: object) -> str:
 
 
 def main() -> None:
-    """Print the table, or put it into the README."""
+    """Print the tables, or put them into the documents."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="put it into README.md")
-    if not parser.parse_args().write:
-        print(table())
-        return
-    readme = ROOT / "README.md"
-    text = readme.read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
-    readme.write_text(f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}", encoding="utf-8")
+    parser.add_argument("--write", action="store_true", help=f"put them into {', '.join(DOCUMENTS)}")
+    write = parser.parse_args().write
+    for name, paper in DOCUMENTS.items():
+        if not write:
+            print(f"{name}\n\n{table(paper=paper)}\n")
+            continue
+        document = ROOT / name
+        before, rest = document.read_text(encoding="utf-8").split(BEGIN)
+        after = rest.split(END)[1]
+        document.write_text(f"{before}{BEGIN}\n\n{table(paper=paper)}\n\n{END}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,263 @@
+"""Numbers of published runs of the benchmark, computed from their episodes.
+
+Rates and p-values come from scipy, not from mpgrasp: an independent computation. Shares are (percent, lower,
+upper bound of the 95 % Wilson interval).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+from scipy.stats import binomtest, wilcoxon
+
+RESULTS = Path(__file__).resolve().parent.parent / "benchmarks" / "results"
+NAMES = {"DHRNet": "dhrnet", "TF-Grasp": "tfgrasp", "GG-CNN2": "ggcnn2"}
+PARTS, BY_MEAN = "controller-parts/stacked", "benchmarks.controller_parts:MppcByMean"
+TIME_LIMIT = 900.0
+"""Simulated time that a table which was not cleared counts as [s]."""
+
+Share = tuple[float, float, float]
+Line = dict[str, Any]
+Cell = dict[int, Line]
+Method = tuple[str, str]
+
+
+@cache
+def episodes(run: str) -> list[Line]:
+    text = (RESULTS / run / "episodes.jsonl").read_text(encoding="utf-8")
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@cache
+def cells(run: str) -> dict[tuple[str, str, str], Cell]:
+    """Return the lines of a run by suite, detector and controller, then by episode."""
+    found: dict[tuple[str, str, str], Cell] = {}
+    for line in episodes(run):
+        key = line["suite"], line["detector"], line["controller"]
+        found.setdefault(key, {})[line["episode"]] = line
+    return found
+
+
+def cell(run: str, detector: str, controller: str, suite: str | None = None) -> Cell:
+    (found,) = (
+        lines for (name, *method), lines in cells(run).items()
+        if method == [detector, controller] and suite in (None, name)
+    )  # fmt: skip
+    return found
+
+
+def entry(entries: Iterable[Mapping[str, Any]], **wanted: Any) -> Mapping[str, Any]:
+    """Return the one entry whose items are as wanted."""
+    (found,) = (item for item in entries if all(item[key] == value for key, value in wanted.items()))
+    return found
+
+
+def share(count: int, n: int) -> Share:
+    bounds = binomtest(count, n).proportion_ci(method="wilson")
+    return 100 * count / n, 100 * bounds.low, 100 * bounds.high
+
+
+def holm(values: Iterable[float]) -> list[float]:
+    """Return the values corrected after Holm, in ascending order."""
+    ordered = sorted(values)
+    corrected = [(len(ordered) - k) * p for k, p in enumerate(ordered)]
+    return [min(1.0, max(corrected[: k + 1])) for k in range(len(ordered))]
+
+
+# runs of the benchmark
+
+
+def success(run: str, detector: str, controller: str, suite: str | None = None) -> Share:
+    lines = cell(run, detector, controller, suite).values()
+    return share(sum(line["success"] for line in lines), len(lines))
+
+
+def success_range(run: str) -> tuple[float, float]:
+    """Return the lowest and the highest rate of all cells of a run [%]."""
+    rates = [100 * mean(line["success"] for line in lines.values()) for lines in cells(run).values()]
+    return min(rates), max(rates)
+
+
+def episodes_of(run: str) -> int:
+    """Return the number of episodes of each cell of a run."""
+    (n,) = {len(lines) for lines in cells(run).values()}
+    return n
+
+
+def objects_of(run: str) -> int:
+    return len({line["object"] for line in episodes(run)})
+
+
+def mean_time(run: str, detector: str, controller: str, suite: str | None = None) -> Share:
+    """Return the mean simulated time with its bootstrap interval [s], of summary.json."""
+    summary = json.loads((RESULTS / run / "summary.json").read_text(encoding="utf-8"))
+    wanted = {"detector": detector, "controller": controller} | ({"suite": suite} if suite else {})
+    found = entry(summary["cells"], **wanted)
+    return found["mean_time_s"], found["mean_time_low"], found["mean_time_high"]
+
+
+def played(detector: str, controller: str, column: str) -> Share | None:
+    """Return what a column of the tables of suites says of a method; None where it was not played."""
+    heading = re.fullmatch(r"([\w-]+)(?:(?: cleared)? %, n = (\d+)|, time \[s\])", column)
+    assert heading, f"unknown column {column}"
+    suite, n = heading.groups()
+    for path in sorted(RESULTS.glob("*/episodes.jsonl")):
+        if (suite, detector, controller) in cells(path.parent.name):
+            if n is None:
+                return mean_time(path.parent.name, detector, controller, suite)
+            assert len(cell(path.parent.name, detector, controller, suite)) == int(n)
+            return success(path.parent.name, detector, controller, suite)
+    return None
+
+
+def failed(run: str, detector: str, controller: str) -> list[Line]:
+    return [line for line in cell(run, detector, controller).values() if not line["success"]]
+
+
+def failures(run: str, detector: str, controller: str, **wanted: str) -> int:
+    """Return the number of failures of a cell, by `outcome` or `object` where given."""
+    lines = failed(run, detector, controller)
+    return sum(all(line[key] == value for key, value in wanted.items()) for line in lines)
+
+
+def all_failures(run: str, **wanted: str) -> int:
+    return sum(failures(run, detector, controller, **wanted) for _, detector, controller in cells(run))
+
+
+def narrow_failures(run: str, detector: str, margin: float) -> tuple[int, int]:
+    """Return the failures whose grasp is narrower than the oracle's by the margin [m], and all failures."""
+    oracle, lines = cell(run, "oracle", "mppc"), failed(run, detector, "mppc")
+    narrow = [
+        line for line in lines if line["grasp"]["width"] + margin <= oracle[line["episode"]]["grasp"]["width"]
+    ]
+    return len(narrow), len(lines)
+
+
+def largest_p_of_pairs(run: str, detector: str, controller: str) -> float:
+    """Return the greatest corrected p of the paired tests of a cell with every other."""
+    summary = json.loads((RESULTS / run / "summary.json").read_text(encoding="utf-8"))
+    method = [detector, controller]
+    return max(float(test["p_holm"]) for test in summary["paired_tests"] if method in (test["a"], test["b"]))
+
+
+def same_outcomes(run: str, other: str) -> tuple[int, int]:
+    """Return how many episodes of a run of one cell end as in the other run, and how many there are."""
+    ((suite, detector, controller),) = cells(run)
+    ours, theirs = cell(run, detector, controller), cell(other, detector, controller, suite)
+    assert ours.keys() == theirs.keys()
+    return sum(line["outcome"] == theirs[k]["outcome"] for k, line in ours.items()), len(ours)
+
+
+def share_of_inference(run: str, detector: str, controller: str) -> float:
+    """Return the share of a control tick that the detector takes [%], of the mean times over all episodes."""
+    times = [line["timing"] for line in cell(run, detector, controller).values()]
+    return 100 * float(mean(t["detect"] for t in times) / mean(sum(t.values()) for t in times))
+
+
+# clearing tables
+
+
+def _restricted(lines: Cell) -> dict[int, float]:
+    return {
+        k: min(line["sim_time_s"], TIME_LIMIT) if line["success"] else TIME_LIMIT for k, line in lines.items()
+    }
+
+
+def _more(run: str, method: Method, other: Method, other_run: str | None) -> list[float]:
+    ours, theirs = _restricted(cell(run, *method)), _restricted(cell(other_run or run, *other))
+    assert ours.keys() == theirs.keys()
+    return [ours[k] - theirs[k] for k in ours]
+
+
+def seconds_more(run: str, method: Method, other: Method, other_run: str | None = None) -> float:
+    """Return how much longer one method takes than another, mean over common tables [s]."""
+    return mean(_more(run, method, other, other_run))
+
+
+def p_of_times(run: str, method: Method, other: Method, other_run: str | None = None) -> float:
+    return float(wilcoxon(_more(run, method, other, other_run)).pvalue)
+
+
+def failed_picks(run: str, detector: str, controller: str) -> int:
+    return sum(sum(line["failures"].values()) for line in cell(run, detector, controller).values())
+
+
+def first_picks(run: str, detector: str, controller: str) -> int:
+    """Return the number of tables whose first pick succeeded."""
+    return sum(line["picks"][0]["outcome"] == "success" for line in cell(run, detector, controller).values())
+
+
+def peaks_at_first_look(run: str) -> float:
+    """Return the share of picks whose first view had a peak [%], over networks in closed loop."""
+    picks = [
+        pick
+        for (_, detector, controller), lines in cells(run).items()
+        if detector != "oracle" and controller != "open_loop"
+        for line in lines.values()
+        for pick in line["picks"]
+    ]
+    return 100 * mean(pick["first_detection_s"] == 0 for pick in picks)
+
+
+# sticks in closed loop
+
+
+def _drifts(detector: str, controller: str) -> dict[int, float]:
+    lines = cell("closed-thickness", detector, controller)
+    return {
+        k: 1e3 * line["blind_drift_m"]
+        for k, line in lines.items()
+        if line["object"] in ("stick_2mm", "stick_3mm")
+    }
+
+
+def thin_sticks() -> int:
+    """Return the number of sticks of 2 and 3 mm that each method met."""
+    (n,) = {len(_drifts(detector, name)) for detector in NAMES.values() for name in ("mppc", "mvp")}
+    return n
+
+
+def drift(detector: str, controller: str) -> float:
+    """Return the mean drift to the side before the first detection of sticks of 2 and 3 mm [mm]."""
+    return mean(_drifts(detector, controller).values())
+
+
+def largest_p_of_drifts() -> float:
+    """Return the greatest corrected p of the drifts of both controllers, over the three detectors."""
+    pairs = [(_drifts(detector, "mvp"), _drifts(detector, "mppc")) for detector in NAMES.values()]
+    return holm(float(wilcoxon([one[k] - other[k] for k in one]).pvalue) for one, other in pairs)[-1]
+
+
+# the paper's orderings
+
+
+@cache
+def orderings() -> dict[tuple[str, str], dict[str, str]]:
+    """Return the rows of the table of hypotheses in the report on the paper's suites, by suite and claim."""
+    text = (
+        (RESULTS / "paper" / "report.md")
+        .read_text(encoding="utf-8")
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+    )
+    lines = iter(text.split("**The paper's orderings as hypotheses**")[1].strip().splitlines())
+    heads, _, *rows = [
+        [word.strip() for word in line.strip("|").split("|")] for line in iter(lambda: next(lines), "")
+    ]
+    found = [dict(zip(heads, row, strict=True)) for row in rows]
+    return {(row["suite"], row["claim"]): row for row in found}
+
+
+def ordering(suite: str, claim: str) -> float:
+    """Return p of a claim, corrected after Holm over all of them."""
+    return float(orderings()[suite, claim]["Holm p"])
+
+
+def verdicts(verdict: str) -> int:
+    return sum(row["verdict"] == verdict for row in orderings().values())

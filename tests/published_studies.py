@@ -1,0 +1,133 @@
+"""Numbers of published studies, computed from their tables and JSON; shares as in tests/published_runs.py."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from functools import cache
+from typing import Any
+
+from published_runs import NAMES, RESULTS, Share, entry, share
+
+
+@cache
+def study(folder: str) -> Any:
+    path = RESULTS / folder
+    return json.loads((path / f"{path.name}.json").read_text(encoding="utf-8"))
+
+
+@cache
+def table_of(folder: str) -> list[dict[str, str]]:
+    with (RESULTS / folder / f"{folder}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def held_out(scenes: str, column: str) -> Share:
+    """Return a rate of the best grasps of one view, from the table of all views."""
+    heading, n = re.fullmatch(r"(all|thin|stacked), n = (\d+)", scenes), re.search(r"\d+$", scenes)
+    assert heading
+    assert n
+    name, metric = column.split()
+    key = {"lifts": "lifted", "hits": "hit"}[metric]
+    rows = [
+        row
+        for row in table_of("held-out")
+        if row["detector"] == NAMES[name]
+        and row["graspable"] == "True"
+        and row.get(heading[1], "True") == "True"
+    ]
+    assert len(rows) == int(n[0])
+    return share(sum(row[key] == "True" for row in rows), len(rows))
+
+
+def p_held_out(metric: str, group: str, other: str) -> float:
+    """Return the corrected p of DHRNet against another network."""
+    return float(
+        entry(study("held-out")["mcnemar"], metric=metric, group=group, a="dhrnet", b=other)["p_holm"]
+    )
+
+
+def bin_of(detector: str, low: float) -> tuple[float, float, float, float, float]:
+    """Return bounds of a bin of claimed quality, and the share that lifts."""
+    found = entry(study("held-out")["calibration"][detector]["bins"], low=low)
+    return (found["low"], found["high"], *share(found["count"], found["n"]))
+
+
+def threshold(detector: str) -> Share:
+    found = study("held-out")["thresholds"][detector]
+    return found["threshold"], found["low"], found["high"]
+
+
+def _views(**wanted: float | str) -> list[dict[str, str]]:
+    return [
+        row
+        for row in table_of("thickness")
+        if all(
+            (row[key] if isinstance(value, str) else float(row[key])) == value
+            for key, value in wanted.items()
+        )
+    ]
+
+
+def detected(stick: str, column: str) -> Share:
+    """Return the share of frames with a peak and the right grasp, by thickness and detector at a height."""
+    name, height, _ = column.split()
+    (row,) = _views(detector=NAMES[name], thickness_mm=float(stick.split()[0]), tcp_height_m=float(height))
+    return share(int(row["detected_count"]), int(row["detected_n"]))
+
+
+def false_peaks() -> tuple[float, ...]:
+    """Return the peaks on bare cloth of the worst network, its views, and bounds of the share [%]."""
+    worst = max(
+        (
+            (sum(int(row["false_peak_count"]) for row in rows), sum(int(row["false_peak_n"]) for row in rows))
+            for rows in (_views(detector=name, thickness_mm=0.0) for name in NAMES.values())
+        ),
+        key=lambda counts: counts[0],
+    )
+    return (*worst, *share(*worst)[1:])
+
+
+def fewest_right(thickness: float, height: float) -> tuple[int, int]:
+    """Return the smallest count of right best pixels over the networks, from a height down, and the views."""
+    heights = [h for h in (0.175, 0.25, 0.35, 0.5) if h <= height]
+    rows = [row for h in heights for row in _views(thickness_mm=thickness, tcp_height_m=h)]
+    return min((int(row["right_count"]), int(row["right_n"])) for row in rows)
+
+
+def ablation(kind: str, label: str, metric: str) -> Share:
+    """Return a rate after the last epoch of a training."""
+    last = entry(study(f"ablation-{kind}")["runs"], label=label)["curve"][-1]
+    assert last["epoch"] == 10
+    return share(last[metric]["count"], last[metric]["n"])
+
+
+def ablation_range(kind: str, prefix: str, metric: str) -> tuple[float, float]:
+    labels = [run["label"] for run in study(f"ablation-{kind}")["runs"] if run["label"].startswith(prefix)]
+    rates = [ablation(kind, label, metric)[0] for label in labels]
+    return min(rates), max(rates)
+
+
+def p_ablation(kind: str, a: str, b: str, metric: str) -> float:
+    return float(entry(study(f"ablation-{kind}")["mcnemar"], metric=metric, a=a, b=b)["p_holm"])
+
+
+def parameters(kind: str) -> tuple[float, float]:
+    """Return the smallest and the greatest number of parameters of a study's networks, in millions."""
+    counts = [run["parameters"] / 1e6 for run in study(f"ablation-{kind}")["runs"]]
+    return min(counts), max(counts)
+
+
+def run_time(network: str, runtime: str) -> float:
+    """Return the median time of `predict()` [ms]."""
+    return float(entry(study("run-time")["rows"], network=network, runtime=runtime)["predict_ms"]["median"])
+
+
+def speed_up(network: str, runtime: str) -> float:
+    return float(entry(study("run-time")["rows"], network=network, runtime=runtime)["speed_up"]["network"])
+
+
+def parameters_of(network: str) -> float:
+    rows = [row["parameters"] for row in study("run-time")["rows"] if row["network"] == network]
+    return float(rows[0]) / 1e6
