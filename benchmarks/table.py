@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from mpgrasp.exceptions import ConfigError
 
@@ -18,19 +19,19 @@ BEGIN, END = "<!-- results: python benchmarks/table.py --write -->", "<!-- end o
 PAPER = ("single", "unseen", "thin", "stacked")
 """Suites of the paper's tables, in their order."""
 DOCUMENTS = {"README.md": True, "docs/results.md": False}
-"""Where the tables stand, and whether the paper's suites are in them or all others."""
+"""Documents with a table; True for the table of the paper's suites, False for that of all others."""
 DETECTORS = ("oracle", "dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
 """Order of the rows; other detectors come after these."""
 NOT_PLAYED = ""
 
 
-def cells() -> list[dict]:
+def cells() -> list[dict[str, Any]]:
     """All published cells, as in the summaries.
 
     Raises:
         ConfigError: two runs have played the same cell.
     """
-    found: list[dict] = []
+    found: list[dict[str, Any]] = []
     source: dict[tuple[str, str, str], Path] = {}
     for path in sorted(RESULTS.glob("*/summary.json")):
         summary = json.loads(path.read_text(encoding="utf-8"))
@@ -81,14 +82,14 @@ def _rank(name: str, order: tuple[str, ...]) -> int:
     return order.index(name) if name in order else len(order)
 
 
-def _rate(cell: dict | None) -> str:
+def _rate(cell: dict[str, Any] | None) -> str:
     if cell is None:
         return NOT_PLAYED
     low, high = (100 * cell[f"wilson_{end}"] for end in ("low", "high"))
     return f"{100 * cell['rate']:.0f} ({low:.0f}-{high:.0f})"
 
 
-def _time(cell: dict | None) -> str:
+def _time(cell: dict[str, Any] | None) -> str:
     if cell is None:
         return NOT_PLAYED
     return f"{cell['mean_time_s']:.0f} ({cell['mean_time_low']:.0f}-{cell['mean_time_high']:.0f})"

@@ -157,7 +157,7 @@ def same_outcomes(run: str, other: str) -> tuple[int, int]:
 def share_of_inference(run: str, detector: str, controller: str) -> float:
     """Return the share of a control tick that the detector takes [%], of the mean times over all episodes."""
     times = [line["timing"] for line in cell(run, detector, controller).values()]
-    return 100 * float(mean(t["detect"] for t in times) / mean(sum(t.values()) for t in times))
+    return 100 * float(sum(t["detect"] for t in times) / sum(sum(t.values()) for t in times))
 
 
 # clearing tables
@@ -202,7 +202,7 @@ def peaks_at_first_look(run: str) -> float:
         for line in lines.values()
         for pick in line["picks"]
     ]
-    return 100 * mean(pick["first_detection_s"] == 0 for pick in picks)
+    return 100 * float(mean(pick["first_detection_s"] == 0 for pick in picks))
 
 
 # sticks in closed loop

@@ -39,7 +39,7 @@ def test_its_ten_lines_of_python_print_what_it_says(tmp_path: Path) -> None:
 
 
 def test_no_link_breaks_on_a_page_without_the_repository() -> None:
-    """An index of packages shows the README alone: a picture's text stands for it there, a link leads nowhere."""
+    """An index of packages shows the README alone: a picture has its text there, a link leads nowhere."""
     links = re.findall(r"(!?)\[[^]]*\]\(([^)]+)\)", README)
     assert links
     assert [target for picture, target in links if not picture and not target.startswith("http")] == []

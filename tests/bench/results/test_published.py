@@ -1,4 +1,4 @@
-"""What benchmarks/results/ publishes is complete, of a known commit and from what ships; no more is there."""
+"""Published results are complete, of a known commit and from the shipped weights; no more is there."""
 
 from __future__ import annotations
 
