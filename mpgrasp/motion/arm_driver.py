@@ -17,8 +17,8 @@ import numpy as np
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.motion.ik import DifferentialIK, IkSolution
-from mpgrasp.motion.reflex import Reflex, ReflexMonitor
-from mpgrasp.motion.time_scaling import paced_profile
+from mpgrasp.motion.reflex import MeasuredArm, Reflex, ReflexMonitor
+from mpgrasp.motion.time_scaling import scaled_profile
 from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, integrate_pose, pose_error
 from mpgrasp.scene.simulation import Simulation
 
@@ -29,14 +29,14 @@ seen from the tool; touching a hard table at 0.05 m/s is 1 N s, 100 N over one t
 
 @dataclass(frozen=True, kw_only=True)
 class MotionStatistics:
-    """What the arm did since the driver was reset."""
+    """Figures of the arm's motion since the driver was reset."""
 
     duration: float
-    """[s]"""
+    """Simulated time [s]."""
     path_length: float
-    """Of the measured tool point [m]."""
+    """Length of the measured tool point's path [m]."""
     min_singular_value: float
-    """Smallest so far."""
+    """Smallest singular value of the tool Jacobian so far."""
     near_singularity: float
     """Time spent below the warning level [s]."""
     max_acceleration: float
@@ -46,7 +46,7 @@ class MotionStatistics:
     max_joint_velocity: FloatArray
     """(7,) largest demanded velocities [rad/s]."""
     jerk_rms: float
-    """Of the measured tool point at the loop's rate [m/s3]."""
+    """Root mean square jerk of the measured tool point at the loop's rate [m/s3]."""
     max_tracking_error: float
     """Largest distance from desired to measured tool point [m]."""
     ik_seconds: float
@@ -133,12 +133,12 @@ class ArmDriver:
 
     @property
     def min_singular_value(self) -> float:
-        """Of the tool Jacobian, now."""
+        """Smallest singular value of the tool Jacobian, now; NaN before the first tick."""
         return np.nan if self.solution is None else self.solution.min_singular_value
 
     @property
     def manipulability(self) -> float:
-        """Of the tool Jacobian, now."""
+        """Manipulability of the tool Jacobian, now; NaN before the first tick."""
         return np.nan if self.solution is None else self.solution.manipulability
 
     def drive(self, twist: FloatArray, duration: float, on_tick: OnTick | None = None) -> Reflex | None:
@@ -199,7 +199,7 @@ class ArmDriver:
         """
         self.stop(on_tick)
         start, error = self.T_desired, pose_error(self.T_desired, T_world_tcp)
-        shares = paced_profile(
+        shares = scaled_profile(
             self.ik, self.q, start, error, self.config,
             max_speed or self.config.max_speed, max_rotation or self.config.max_rotation,
         )  # fmt: skip
@@ -231,7 +231,7 @@ class ArmDriver:
         return self.reflex
 
     def statistics(self) -> MotionStatistics:
-        """What the arm did since `reset`."""
+        """Figures of the arm's motion since `reset`."""
         return MotionStatistics(
             duration=self.simulation.time - self._start,
             path_length=self._path_length,
@@ -263,10 +263,11 @@ class ArmDriver:
         T, achieved = sim.T_world_tcp, sim.twist_tcp
         self._forces.append(sim.external_force)
         self._observe(twist, T, achieved)
-        self.monitor.check(
-            time=sim.time, dt=c.dt, solution=self.solution, q=sim.q, dq=sim.dq, twist=achieved,
-            T_world_tcp=T, T_world_tcp_desired=T_desired, contact_force=self.external_force,
+        arm = MeasuredArm(
+            time=sim.time, q=sim.q, dq=sim.dq, twist=achieved, T_world_tcp=T,
+            contact_force=self.external_force,
         )  # fmt: skip
+        self.monitor.check(arm, self.solution, T_desired, c.dt)
         if self.reflex is not None:
             # brakes on: hold where the arm is
             self.q = np.array(sim.q, float)

@@ -36,7 +36,7 @@ class IkConfig:
     posture_cost: float = 1e-2
     """Weight of the elbow posture against 1 for the tool pose: enough for the null space only."""
     posture_rate: float = 0.2
-    """How fast the elbow swings home within the null space [1/s]."""
+    """Rate at which the elbow swings home within the null space [1/s]."""
     posture_smoothing: float = 0.5
     """Time constant with which that motion sets in, so that it starts without a jerk [s]."""
     joint_margin: float = 0.01
@@ -50,7 +50,7 @@ class IkConfig:
     collision_rate: float = 10.0
     """Approach to `collision_distance` slows down at this rate [1/s]."""
     collisions: bool = True
-    """Whether to avoid collisions at all."""
+    """True to avoid collisions at all."""
 
     def __post_init__(self) -> None:
         for name in ("damping", "posture_cost", "posture_rate", "joint_margin"):
@@ -94,7 +94,7 @@ class IkSolution:
     blocked_value: float = 0.0
     """Demanded velocity, commanded position or distance at that limit [rad/s, rad, m]."""
     blocked_bound: float = 0.0
-    """What the limit allows, same unit."""
+    """Bound of that limit, same unit."""
 
 
 @cache
