@@ -10,8 +10,9 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution_config import ExecutionConfig
+from mpgrasp.motion.execution_state import ExecutionState
 from mpgrasp.motion.heading import reachable_yaw
-from mpgrasp.motion.phases import PHASES, Execution
+from mpgrasp.motion.phases import PHASES
 from mpgrasp.motion.verdict import ExecutionResult, judge
 
 OnPhase = Callable[[str, ArmDriver], None]
@@ -37,9 +38,9 @@ def execute_grasp(
     check_finite(grasp)
     told = None if on_tick is None else lambda phase: on_tick(phase, driver)
     yaw = reachable_yaw(driver, grasp)
-    execution = Execution(driver, grasp, config or ExecutionConfig(), yaw=yaw, on_tick=told)
-    execution.play(PHASES)
-    return judge(execution)
+    state = ExecutionState(driver, grasp, config or ExecutionConfig(), yaw=yaw, on_tick=told)
+    state.play(PHASES)
+    return judge(state)
 
 
 def check_finite(grasp: Grasp) -> None:

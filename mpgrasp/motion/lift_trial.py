@@ -18,9 +18,10 @@ from mpgrasp.grasp import Grasp
 from mpgrasp.motion import phases
 from mpgrasp.motion.execution import check_finite
 from mpgrasp.motion.execution_config import ExecutionConfig
+from mpgrasp.motion.execution_state import ExecutionState, Phase
 from mpgrasp.motion.hand_driver import HandDriver
 from mpgrasp.motion.heading import nearest_yaw
-from mpgrasp.motion.phases import PHASES, Execution, Phase
+from mpgrasp.motion.phases import PHASES
 from mpgrasp.motion.verdict import judge
 from mpgrasp.outcome import Outcome
 from mpgrasp.robot import hand
@@ -74,15 +75,15 @@ class LiftRig:
         driver = HandDriver(self._hand)
         # of both headings the one at which the camera looks away from the arm's base, as the arm would
         yaw = nearest_yaw(grasp.angle + np.pi / 2, 0.0)
-        execution = Execution(driver, grasp, self.config, yaw=yaw)
-        execution.play(TrialPhases(driver).by_name)
-        result = judge(execution)
+        state = ExecutionState(driver, grasp, self.config, yaw=yaw)
+        state.play(TrialPhases(driver).by_name)
+        result = judge(state)
         names = (result.lifted,) if result.lifted else result.between
         return LiftResult(
             outcome=Outcome.COLLISION if result.outcome is Outcome.REFLEX else result.outcome,
             reason=result.reason,
             lifted=result.lifted,
-            rise=max((execution.height_of(name) - execution.rest[name] for name in names), default=0.0),
+            rise=max((state.height_of(name) - state.rest[name] for name in names), default=0.0),
             duration=result.duration,
         )
 
@@ -106,55 +107,55 @@ class TrialPhases:
             "shake": self.shake,
         }
 
-    def pregrasp(self, execution: Execution) -> None:
+    def pregrasp(self, state: ExecutionState) -> None:
         """Begin just above the first contact on the way down, or above what stands over the pre-grasp."""
-        c = execution.config
-        width = float(np.clip(execution.grasp.width + c.opening_margin, 0.0, hand.GRIPPER_MAX_WIDTH))
-        ready = float(execution.grasp.position[2]) + c.approach
-        free = self._lowest_free(execution, max(ready, self._hand.top + hand.FINGERTIP_BEYOND_TCP), width)
+        c = state.config
+        width = float(np.clip(state.grasp.width + c.opening_margin, 0.0, hand.GRIPPER_MAX_WIDTH))
+        ready = float(state.grasp.position[2]) + c.approach
+        free = self._lowest_free(state, max(ready, self._hand.top + hand.FINGERTIP_BEYOND_TCP), width)
         above = free > ready
         run_up = self._run_up(c.approach_speed if above else c.descent_speed)
-        self._place(execution, free + run_up, width)
+        self._place(state, free + run_up, width)
         if above:
-            phases.pregrasp(execution)
+            phases.pregrasp(state)
 
-    def close(self, execution: Execution) -> None:
+    def close(self, state: ExecutionState) -> None:
         """Close the gripper; all is lost where the pads meet."""
-        phases.close(execution)
-        self._lost = not execution.between and execution.width < 1e-3
+        phases.close(state)
+        self._lost = not state.between and state.width < 1e-3
 
-    def lift(self, execution: Execution) -> None:
+    def lift(self, state: ExecutionState) -> None:
         """Lift unless all is lost, as it is where no pad touches anything at the end."""
         if not self._lost:
-            phases.lift(execution)
+            phases.lift(state)
             left, right = self._hand.pad_contacts()
             self._lost = not left | right
 
-    def hold(self, execution: Execution) -> None:
+    def hold(self, state: ExecutionState) -> None:
         """Hold unless all is lost, until nothing creeps: what does not by then will not later."""
         if not self._lost:
-            between = execution.between
+            between = state.between
             until = (lambda: self._hand.are_still(between)) if between else None
-            self._driver.wait(execution.config.hold_time, until=until)
+            self._driver.wait(state.config.hold_time, until=until)
 
-    def shake(self, execution: Execution) -> None:
+    def shake(self, state: ExecutionState) -> None:
         """Shake unless all is lost."""
         if not self._lost:
-            phases.shake(execution)
+            phases.shake(state)
 
-    def _lowest_free(self, execution: Execution, z: float, width: float) -> float:
+    def _lowest_free(self, state: ExecutionState, z: float, width: float) -> float:
         """Lowest height [m] that the hand reaches on its way down from z without touching anything."""
-        bottom = execution.planned + hand.FINGERTIP_BEYOND_TCP
+        bottom = state.planned + hand.FINGERTIP_BEYOND_TCP
         while z > bottom:
-            self._place(execution, z - SCAN_STEP, width)
+            self._place(state, z - SCAN_STEP, width)
             if self._hand.touches():
                 break
             z -= SCAN_STEP
         return z
 
-    def _place(self, execution: Execution, z: float, width: float) -> None:
-        x, y = execution.grasp.position[:2]
-        self._hand.place([x, y, z], execution.yaw, width)
+    def _place(self, state: ExecutionState, z: float, width: float) -> None:
+        x, y = state.grasp.position[:2]
+        self._hand.place([x, y, z], state.yaw, width)
 
     def _run_up(self, speed: float) -> float:
         """Way in which the hand is sure to get up to a speed [m]."""

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector
-from mpgrasp.motion.ik import IkSolution
+from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.robot import panda
 
 UNITS = {

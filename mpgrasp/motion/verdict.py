@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from mpgrasp.motion.phases import Execution
+from mpgrasp.motion.execution_state import ExecutionState
 from mpgrasp.motion.reflex import Reflex
 from mpgrasp.outcome import Outcome
 
@@ -41,40 +41,40 @@ class ExecutionResult:
     """Simulated time of the whole execution [s]."""
 
 
-def judge(execution: Execution) -> ExecutionResult:
+def judge(state: ExecutionState) -> ExecutionResult:
     """Judge an execution after its last phase, or after the protective stop that ended it.
 
     Success takes an object that touches both pads, `success_height` or more above its place of rest.
     """
-    outcome, reason, lifted = _verdict(execution)
+    outcome, reason, lifted = _verdict(state)
     return ExecutionResult(
         outcome=outcome,
         reason=reason,
         lifted=lifted,
-        between=execution.between,
-        reflex=execution.driver.reflex,
-        contact_height=execution.contact_height,
-        planned_height=execution.planned,
-        tip_height=execution.tip_height,
-        width=execution.width,
-        duration=execution.simulation.time - execution.start,
+        between=state.between,
+        reflex=state.driver.reflex,
+        contact_height=state.contact_height,
+        planned_height=state.planned,
+        tip_height=state.tip_height,
+        width=state.width,
+        duration=state.simulation.time - state.start,
     )
 
 
-def _verdict(execution: Execution) -> tuple[ExecutionOutcome, str, str | None]:
+def _verdict(state: ExecutionState) -> tuple[ExecutionOutcome, str, str | None]:
     """Outcome, reason, and the object that was lifted."""
-    c, reflex, rest = execution.config, execution.driver.reflex, execution.rest
+    c, reflex, rest = state.config, state.driver.reflex, state.rest
     if reflex is not None:
-        return Outcome.REFLEX, f"{reflex} while in phase {execution.phase}", None
-    left, right = execution.simulation.pad_contacts()
-    raised = [name for name in rest if execution.height_of(name) - rest[name] >= c.success_height]
+        return Outcome.REFLEX, f"{reflex} while in phase {state.phase}", None
+    left, right = state.simulation.pad_contacts()
+    raised = [name for name in rest if state.height_of(name) - rest[name] >= c.success_height]
     for name in sorted(left & right):
         if name in raised:
             return Outcome.SUCCESS, f"{name} is held", name
-    if execution.between:
-        names = ", ".join(execution.between)
+    if state.between:
+        names = ", ".join(state.between)
         return Outcome.SLIPPED, f"{names} was between the pads and was lost", None
-    met, planned = execution.contact_height, execution.planned
+    met, planned = state.contact_height, state.planned
     if met is not None and met > max(c.support_band, planned + 0.002):
         reason = (
             f"the fingers met something {1e3 * met:.1f} mm over the table, "

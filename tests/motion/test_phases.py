@@ -12,7 +12,8 @@ import pytest
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.execution_config import ExecutionConfig
-from mpgrasp.motion.phases import PHASES, Execution, Phase, descend, pregrasp
+from mpgrasp.motion.execution_state import ExecutionState, Phase
+from mpgrasp.motion.phases import PHASES, descend, pregrasp
 from mpgrasp.robot.hand import FINGERTIP_BEYOND_TCP
 
 GRASP = Grasp(position=np.array([0.5, 0.1, 0.06]), angle=0.0, width=0.03, quality=1.0)
@@ -55,39 +56,39 @@ class PlainDriver:
     def follow(self, *_: Any, **__: Any) -> None: ...
 
 
-def execution_by(driver: PlainDriver, **changes: Any) -> Execution:
-    return Execution(driver, GRASP, ExecutionConfig(), yaw=0.0, **changes)
+def state_by(driver: PlainDriver, **changes: Any) -> ExecutionState:
+    return ExecutionState(driver, GRASP, ExecutionConfig(), yaw=0.0, **changes)
 
 
 def test_phases_are_played_in_order_and_each_tick_is_told_its_own() -> None:
     told: list[str] = []
 
-    def two_moves(execution: Execution) -> None:
-        execution.rise(0.01, 0.1)
-        execution.rise(0.01, 0.1)
+    def two_moves(state: ExecutionState) -> None:
+        state.rise(0.01, 0.1)
+        state.rise(0.01, 0.1)
 
-    execution_by(PlainDriver(), on_tick=told.append).play({"first": two_moves, "then": two_moves})
+    state_by(PlainDriver(), on_tick=told.append).play({"first": two_moves, "then": two_moves})
     assert told == ["first", "first", "then", "then"]
 
 
 def test_nothing_is_played_after_a_protective_stop() -> None:
     driver, played = PlainDriver(), []
 
-    def stopped(execution: Execution) -> None:
-        played.append(execution.phase)
+    def stopped(state: ExecutionState) -> None:
+        played.append(state.phase)
         driver.reflex = "contact_force"
 
     phases: dict[str, Phase] = {**PHASES, "descend": stopped}
-    execution = execution_by(driver)
-    execution.play(phases)
-    assert (played, execution.phase) == (["descend"], "descend")
+    state = state_by(driver)
+    state.play(phases)
+    assert (played, state.phase) == (["descend"], "descend")
 
 
 def test_the_tool_comes_down_onto_the_pregrasp_from_wherever_it_is() -> None:
     c = ExecutionConfig()
     for start, ways in ((0.4, 1), (0.05, 2)):  # from below it rises first
         driver = PlainDriver(z=start)
-        pregrasp(execution_by(driver))
+        pregrasp(state_by(driver))
         assert len(driver.moves) == ways
         assert driver.widths == [pytest.approx(0.03 + c.opening_margin)]
         assert all(z == pytest.approx(0.06 + c.approach) for z, _ in driver.moves)
@@ -95,19 +96,19 @@ def test_the_tool_comes_down_onto_the_pregrasp_from_wherever_it_is() -> None:
 
 def test_the_descent_slows_down_and_ends_as_deep_as_the_palm_allows() -> None:
     driver, c = PlainDriver(), ExecutionConfig()
-    execution = execution_by(driver)
-    descend(execution)
+    state = state_by(driver)
+    descend(state)
     heights = [z - FINGERTIP_BEYOND_TCP for z, _ in driver.moves]
     assert heights == pytest.approx([0.06 + c.entry_height, 0.06 - c.palm_depth])
     assert [speed for _, speed in driver.moves] == [c.descent_speed, c.entry_speed]
-    assert execution.contact_height is None
-    assert execution.tip_height == pytest.approx(0.06 - c.palm_depth)
+    assert state.contact_height is None
+    assert state.tip_height == pytest.approx(0.06 - c.palm_depth)
 
 
 def test_a_descent_that_feels_something_backs_off_a_little() -> None:
     driver, c = PlainDriver(ground=0.03), ExecutionConfig()
-    execution = execution_by(driver)
-    descend(execution)
-    assert execution.contact_height == pytest.approx(0.03)
-    assert execution.tip_height == pytest.approx(0.03 + c.back_off)
+    state = state_by(driver)
+    descend(state)
+    assert state.contact_height == pytest.approx(0.03)
+    assert state.tip_height == pytest.approx(0.03 + c.back_off)
     assert len(driver.moves) == 3

@@ -9,7 +9,7 @@ import pytest
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import rotation_z, transform
-from mpgrasp.motion.ik import IkSolution
+from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.reflex import UNITS, MeasuredArm, Reflex, ReflexConfig, ReflexMonitor
 from mpgrasp.robot import panda
 
