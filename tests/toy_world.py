@@ -1,12 +1,16 @@
-"""A small world of one geom of every kind, and views of it, for the tests of the camera."""
+"""A small world of one geom of every kind, views of it, and a mark for tests that need OpenGL."""
 
 from __future__ import annotations
 
 import cv2
 import mujoco
 import numpy as np
+import pytest
 
-from mpgrasp.depth import CameraIntrinsics
+from mpgrasp.camera import rasteriser
+from mpgrasp.camera.wrist_camera import WristCamera
+from mpgrasp.depth import CameraIntrinsics, DepthFrame
+from mpgrasp.exceptions import CameraError
 from mpgrasp.geometry import FloatArray, look_at, looking_down
 
 World = tuple[mujoco.MjModel, mujoco.MjData]
@@ -43,6 +47,13 @@ POSES = [
     look_at([0.2, 0.15, 0.4], [0, 0, 0], x_axis=(0, 1, 0)),
 ]
 
+try:
+    rasteriser.require_gl()
+    HAS_GL = True
+except CameraError:
+    HAS_GL = False
+needs_gl = pytest.mark.skipif(not HAS_GL, reason="no OpenGL on this machine")
+
 
 def toy_world() -> World:
     """The world of `XML` with an uneven cloth, at 2.5 s, kinematics computed."""
@@ -61,3 +72,8 @@ def edges_of(depth: FloatArray) -> np.ndarray:
     filled = np.nan_to_num(depth, nan=9.0)
     kernel = np.ones((3, 3), np.uint8)
     return np.asarray(cv2.dilate(filled, kernel) - cv2.erode(filled, kernel) > 0.01)
+
+
+def true_frame(camera: WristCamera, data: mujoco.MjData) -> DepthFrame:
+    """Perfect depth from the model's own camera."""
+    return camera.render(data, camera.pose(data))
