@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import coacd
@@ -90,7 +91,7 @@ def loft(sections: list[tuple[float, list[tuple[float, float]]]]) -> Part:
     return hull([(x, side * y, z) for x, outline in sections for y, z in outline for side in (-1, 1)])
 
 
-def extruded(outline: list[tuple[float, float]], thickness: float) -> list[Part]:
+def extruded(outline: Sequence[tuple[float, float]], thickness: float) -> list[Part]:
     """Board cut along a closed outline in x and z, counter-clockwise, taken apart by CoACD."""
     points = np.array(outline, float)
     mesh = trimesh.creation.extrude_triangulation(points, _ears(points), thickness)
