@@ -173,7 +173,7 @@ def _resize_by_area(depth: NDArray[np.float32], size: int) -> NDArray[np.float32
             mass += w
             w *= np.where(near, offset, np.float32(0))
             total += w
-    return reference + total / np.where(mass > 0, mass, 1)
+    return np.asarray(reference + total / np.where(mass > 0, mass, 1))
 
 
 @functools.lru_cache(maxsize=8)

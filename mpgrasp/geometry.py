@@ -43,6 +43,20 @@ def rotation_z(angle: float) -> FloatArray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
+    """Rotation (3, 3) of a quaternion (4,), wxyz, of unit length."""
+    w, x, y, z = (float(number) for number in np.asarray(quaternion, float))
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    # summed in the order of MuJoCo's mju_quat2Mat, so that poses agree with it to the last bit
+    return np.array(
+        [
+            [(ww - yy) + (xx - zz), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), (ww + yy) - (xx + zz), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), (ww - yy) + (zz - xx)],
+        ]
+    )
+
+
 def looking_down(position: ArrayLike, yaw: float = 0.0) -> FloatArray:
     """Pose (4, 4) whose z axis points straight down and whose x axis has heading `yaw` in the world.
 
@@ -94,5 +108,5 @@ def rotation_vector(R: FloatArray) -> FloatArray:
         return axis / 2
     if sine < 1e-6:  # half a turn: the axis is the eigenvector of eigenvalue 1
         values, vectors = np.linalg.eigh((R + R.T) / 2)
-        return vectors[:, np.argmax(values)] * angle
-    return axis / (2 * sine) * angle
+        return np.asarray(vectors[:, np.argmax(values)] * angle)
+    return np.asarray(axis / (2 * sine) * angle)

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Outcome(StrEnum):
-    """How an episode ended."""
+    """Ending of an episode, an execution or a trial."""
 
     SUCCESS = "success"
     NO_GRASP = "no_grasp"

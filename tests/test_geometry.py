@@ -1,11 +1,18 @@
+"""Transforms, rotations and angles agree with their definitions and with other libraries."""
+
+from __future__ import annotations
+
+import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mpgrasp.geometry import (
     invert,
     line_angle_difference,
     look_at,
     looking_down,
+    rotation_from_quaternion,
     rotation_vector,
     rotation_x,
     rotation_z,
@@ -78,3 +85,14 @@ def test_rotation_vector_is_axis_times_angle(angle: float) -> None:
         assert abs(axis @ turned[:, 2]) == pytest.approx(1, abs=1e-6)
         if angle < np.pi:
             assert axis @ turned[:, 2] > 0
+
+
+def test_a_quaternion_turns_as_in_scipy_and_as_in_mujoco() -> None:
+    expected = np.empty(9)
+    for wxyz in np.random.default_rng(0).standard_normal((100, 4)):
+        wxyz /= np.linalg.norm(wxyz)
+        R = rotation_from_quaternion(wxyz)
+        np.testing.assert_allclose(R, Rotation.from_quat(np.roll(wxyz, -1)).as_matrix(), atol=1e-14)
+        mujoco.mju_quat2Mat(expected, wxyz)
+        np.testing.assert_allclose(R.ravel(), expected, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(rotation_from_quaternion((1.0, 0.0, 0.0, 0.0)), np.eye(3))

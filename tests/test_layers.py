@@ -189,7 +189,8 @@ def loaded(code: str, *arguments: str) -> list[str]:
 @pytest.mark.parametrize(
     "module",
     ["mpgrasp", "mpgrasp.detectors", "mpgrasp.controllers", "mpgrasp.controllers.mppc", "mpgrasp.scene",
-     "mpgrasp.camera", "mpgrasp.motion", "mpgrasp.episode", "mpgrasp.suite", "mpgrasp.plugins",
+     "mpgrasp.scene.config", "mpgrasp.scene.objects.from_mesh", "mpgrasp.camera", "mpgrasp.camera.backends",
+     "mpgrasp.robot.hand", "mpgrasp.motion", "mpgrasp.episode", "mpgrasp.suite", "mpgrasp.plugins",
      "mpgrasp.bench"],
 )  # fmt: skip
 def test_importing_a_room_loads_nothing_heavy(module: str) -> None:
@@ -203,7 +204,7 @@ def test_importing_the_environment_loads_no_torch() -> None:
 @pytest.mark.parametrize(
     "words",
     [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "report", "--help"),
-     ("detectors", "--help")],
+     ("detectors", "--help"), ("scene", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
     module = f"mpgrasp.{words[0]}"

@@ -33,9 +33,9 @@ def centred(parts: list[Part]) -> list[Part]:
         if part.vertices is not None:
             moved.append(Part(shape="mesh", vertices=part.vertices - centre))
         else:
-            position = tuple(float(v) for v in np.array(part.position) - centre)
+            x, y, z = (float(v) for v in np.array(part.position) - centre)
             moved.append(
-                Part(shape=part.shape, size=part.size, position=position, quaternion=part.quaternion)
+                Part(shape=part.shape, size=part.size, position=(x, y, z), quaternion=part.quaternion)
             )
     return moved
 

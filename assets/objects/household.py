@@ -40,12 +40,11 @@ def can() -> Declared:
 def soap() -> Declared:
     """Bar of soap."""
     a, b = np.meshgrid(np.linspace(-np.pi / 2, np.pi / 2, 9), np.arange(20) * np.pi / 10)
-    sign = lambda v, p: np.sign(v) * np.abs(v) ** p  # noqa: E731
     shape = np.column_stack(
         [
-            42 * sign(np.cos(a.ravel()), 0.5) * sign(np.cos(b.ravel()), 0.6),
-            27 * sign(np.cos(a.ravel()), 0.5) * sign(np.sin(b.ravel()), 0.6),
-            14 * sign(np.sin(a.ravel()), 0.7),
+            42 * _signed_power(np.cos(a.ravel()), 0.5) * _signed_power(np.cos(b.ravel()), 0.6),
+            27 * _signed_power(np.cos(a.ravel()), 0.5) * _signed_power(np.sin(b.ravel()), 0.6),
+            14 * _signed_power(np.sin(a.ravel()), 0.7),
         ]
     )
     return Declared(
@@ -126,3 +125,8 @@ def bowl() -> Declared:
         *ring((40, 47), (44, 51), 24, 45, 16),
     ]
     return Declared(parts, 150, 0.5, (0.55, 0.68, 0.72), "small bowl, 102 x 45 mm, wall 4 mm; 150 g")
+
+
+def _signed_power(values: np.ndarray, power: float) -> np.ndarray:
+    """Power of the absolute values, with their signs."""
+    return np.asarray(np.sign(values) * np.abs(values) ** power)

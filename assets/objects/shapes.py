@@ -1,14 +1,16 @@
-"""Convex pieces from dimensions in millimetres: what the objects of the catalogue are put together from."""
+"""Convex pieces from dimensions in millimetres, of which the objects of the catalogue consist."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import coacd
 import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
 
-from mpgrasp.scene.objects.from_mesh import convex_pieces
+from mpgrasp.scene.objects.from_mesh import CONVEX_ENOUGH, MAX_PIECES
 from mpgrasp.scene.objects.model import Part
 
 MM = 1e-3
@@ -89,7 +91,7 @@ def loft(sections: list[tuple[float, list[tuple[float, float]]]]) -> Part:
     return hull([(x, side * y, z) for x, outline in sections for y, z in outline for side in (-1, 1)])
 
 
-def extruded(outline: list[tuple[float, float]], thickness: float) -> list[Part]:
+def extruded(outline: Sequence[tuple[float, float]], thickness: float) -> list[Part]:
     """Board cut along a closed outline in x and z, counter-clockwise, taken apart by CoACD."""
     points = np.array(outline, float)
     mesh = trimesh.creation.extrude_triangulation(points, _ears(points), thickness)
@@ -120,10 +122,22 @@ def tube(centres: np.ndarray, radii: np.ndarray, sides: int = 16) -> list[Part]:
 
 
 def _cut(mesh: trimesh.Trimesh) -> list[Part]:
+    """Convex pieces of a closed surface, by CoACD where it is not convex."""
     if mesh.volume < 0:
         mesh.invert()
     assert mesh.is_volume
-    return [hull(piece) for piece in convex_pieces(mesh, threshold=0.05)]
+    whole = mesh.convex_hull
+    if mesh.volume >= CONVEX_ENOUGH * whole.volume:
+        return [hull(whole.vertices)]
+    coacd.set_log_level("error")
+    cut = coacd.run_coacd(
+        coacd.Mesh(mesh.vertices, mesh.faces),
+        threshold=0.05,
+        max_convex_hull=MAX_PIECES,
+        resolution=1000,
+        seed=0,
+    )
+    return [hull(vertices) for vertices, _ in cut]
 
 
 def _ears(points: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ _TYPE = mujoco.mjtGeom
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid:
-    """What lies behind all of some planes and, maybe, within an ellipsoid or an elliptic tube."""
+    """Intersection of half-spaces and, maybe, of an ellipsoid or an elliptic tube."""
 
     planes: FloatArray
     """(k, 4) as (n, d): n . x <= d, unit normals [-], distances [m]."""
@@ -128,7 +128,7 @@ def _convex_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Solid, ...]:
 
 
 def _closed(triangles: NDArray[np.int32]) -> bool:
-    """Whether every edge belongs to two triangles, once in each direction."""
+    """True if every edge belongs to two triangles, once in each direction."""
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
     size = int(ends.max()) + 1
     there, back = ends[:, 0] * size + ends[:, 1], ends[:, 1] * size + ends[:, 0]

@@ -64,7 +64,7 @@ def _triangles(model: mujoco.MjModel, field: int) -> _Triangles:
 def height_field_depth(
     model: mujoco.MjModel, field: int, origin: FloatArray, directions: tuple[Image, Image, Image]
 ) -> tuple[Image, Mask]:
-    """Where rays meet a height field.
+    """Return the depth at which rays meet a height field.
 
     Args:
         model: holds the field.

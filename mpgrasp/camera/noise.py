@@ -1,4 +1,4 @@
-"""What a stereo depth camera makes of the true depth image: noise, steps, shadows, holes.
+"""Errors of a stereo depth camera: noise, steps, shadows and holes in the true depth image.
 
 The model is that of an Intel RealSense D435, whose depth is f B / disparity with the disparity matched
 between two imagers a baseline apart (Keselman et al. 2017, "Intel RealSense stereoscopic depth cameras";
@@ -36,7 +36,7 @@ class DepthNoise:
     min_z: float = 0.18
     """Nearest depth that is reported [m]; datasheet, about 0.18 at 848 x 480."""
     shadows: bool = True
-    """Whether background that the right imager cannot see is missing."""
+    """True if background that the right imager cannot see is missing."""
     max_incidence: float = float(np.deg2rad(82.0))
     """Surfaces seen at a larger angle from their normal are missing [rad]; assumed: at half a metre a
     matching window a few pixels wide then spans several pixels of disparity."""
@@ -53,10 +53,6 @@ class DepthNoise:
         if not 0 < self.max_incidence <= np.pi / 2:
             raise ConfigError("max_incidence", got=self.max_incidence, allowed="above 0, up to pi/2 [rad]")
 
-    def sigma(self, z: float) -> float:
-        """Standard deviation [m] of the depth at z [m], before quantisation."""
-        return z * z * self.subpixel / (self.focal_px * self.baseline)
-
     def shadow_px(self, z_near: float, z_far: float, focal_px: float) -> float:
         """Width of the shadow [px] that an edge at z_near casts on z_far [m] in an image of `focal_px`."""
         return focal_px * self.baseline * (1 / z_near - 1 / z_far)
@@ -72,7 +68,7 @@ def apply(
     rng: np.random.Generator,
     noise: DepthNoise,
 ) -> NDArray[np.float32]:
-    """What the sensor reports for a true depth image.
+    """Return what the sensor reports for a true depth image.
 
     The generator advances by the image's size alone, never by its content.
 
@@ -95,7 +91,7 @@ def apply(
         np.rint(error, out=error)
         error *= np.float32(noise.disparity_step)
     with np.errstate(divide="ignore"):
-        measured = np.divide(fb, error, out=error)
+        measured: NDArray[np.float32] = np.divide(fb, error, out=error)
     if noise.multiplicative > 0:
         white = rng.standard_normal(depth.shape, dtype=np.float32)
         measured *= 1 + np.float32(noise.multiplicative) * white
@@ -165,8 +161,8 @@ def _grazing(
 def _steep(
     before: NDArray[np.float32], after: NDArray[np.float32], bound: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
-    """Where both steps, before and after a pixel, go up by more than the bound or both go down by more."""
+    """True where the steps before and after a pixel both go up, or both go down, by more than the bound."""
     steepest = np.minimum(before, after)
     fall = np.maximum(before, after)
     np.maximum(steepest, np.negative(fall, out=fall), out=steepest)
-    return steepest > bound
+    return np.asarray(steepest > bound)

@@ -32,7 +32,7 @@ _MARGIN = 1  # [px] by which windows are too large, for rounding
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RayHits:
-    """What the rays of an image met."""
+    """Depth, geom and normal that the rays of an image met."""
 
     depth: NDArray[np.float32]
     """(H, W) z-depth [m], NaN where nothing was met."""
@@ -159,17 +159,6 @@ class RayCaster:
                 yield geom, (slice(top, bottom), slice(left, right))
 
 
-def ray_cast(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    intrinsics: CameraIntrinsics,
-    T_world_camera: FloatArray,
-    geom_groups: tuple[int, ...] = (0, 1, 2),
-) -> NDArray[np.float32]:
-    """Z-depth (H, W) [m] seen by an OpenCV camera at `T_world_camera` (4, 4), of a single image."""
-    return RayCaster(model, intrinsics, geom_groups=geom_groups).render(data, T_world_camera)
-
-
 def _solid(solid: Solid, rotation: FloatArray, origin: FloatArray, rays: Image) -> tuple[Image, Mask | None]:
     """Inverse depth of a solid, 0 beside it; and the pixels where it reaches through the near plane."""
     enter, leave = solid.inverse_depth(rotation, origin, rays.reshape(3, -1))
@@ -185,7 +174,7 @@ def _plane(size: FloatArray, rotation: FloatArray, origin: FloatArray, rays: Ima
     x, y, z = np.tensordot(rotation.astype(np.float32), rays, axes=1)
     if origin[2] <= 0:
         return np.zeros_like(x)
-    inverse = z * np.float32(-1 / origin[2])
+    inverse: Image = z * np.float32(-1 / origin[2])
     inverse[(inverse < 0) | (inverse > 1 / NEAR)] = 0
     for along, start, half in ((x, origin[0], size[0]), (y, origin[1], size[1])):
         if half > 0:  # 0 stands for an infinite one
@@ -214,7 +203,7 @@ def mujoco_rays(
     fixed: bool = True,
     normal: FloatArray | None = None,
 ) -> tuple[FloatArray, NDArray[np.int32]]:
-    """What MuJoCo's own rays meet between the near and the far plane.
+    """Return the first thing that MuJoCo's own rays meet between the near and the far plane.
 
     Args:
         model: the world.

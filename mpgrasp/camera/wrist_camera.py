@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.camera import noise as sensor_noise
+from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.camera.rasteriser import Rasteriser, require_gl
 from mpgrasp.camera.ray_caster import RayCaster
@@ -25,8 +26,8 @@ from mpgrasp.geometry import FloatArray, transform
 
 D435_INTRINSICS = CameraIntrinsics(fx=385.0, fy=385.0, cx=319.5, cy=239.5, width=640, height=480)
 """Intel RealSense D435, depth stream of 640 x 480 px."""
-BACKENDS = ("auto", "gl", "ray")
 WRIST = "panda/wrist"
+"""Name of the camera in a model."""
 
 _MUJOCO_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 _DEFAULT_NOISE = DepthNoise()
@@ -34,13 +35,12 @@ _log = logging.getLogger(__name__)
 
 
 class WristCamera:
-    """Depth images of a model from one of its cameras, or from any pose.
+    """Depth images of a model from its wrist camera, or from any pose.
 
     Args:
-        model: the world.
+        model: the world; it may lack the wrist camera where only `render` is used.
         backend: "gl", "ray" or "auto", which takes GL where there is one.
         noise: sensor model, or None for perfect depth.
-        camera: name of the camera in the model; the model may lack it where only `render` is used.
         intrinsics: geometry of the sensor's whole image.
         crop: side of the central square of the image that is wanted [px]; None for all of it. Nothing else is
             computed, apart from the margin that the noise needs, and frames have this size.
@@ -58,7 +58,6 @@ class WristCamera:
         backend: str = "auto",
         noise: DepthNoise | None = _DEFAULT_NOISE,
         *,
-        camera: str = WRIST,
         intrinsics: CameraIntrinsics = D435_INTRINSICS,
         crop: int | None = None,
         geom_groups: tuple[int, ...] = (0, 1, 2),
@@ -75,7 +74,6 @@ class WristCamera:
         # the shadow of an edge depends on what lies to its right, so that much more is looked at
         margin = 0 if noise is None or crop is None else noise.margin_px(intrinsics)
         self._model = model
-        self._camera = camera
         self._geom_groups = geom_groups
         self._seen = replace(self.intrinsics, width=self.intrinsics.width + margin)
         self._ray_caster: RayCaster | None = None
@@ -85,21 +83,17 @@ class WristCamera:
 
     def pose(self, data: mujoco.MjData) -> FloatArray:
         """`T_world_camera` (4, 4) of the model's camera, OpenCV axes, as of the last forward kinematics."""
-        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA.value, self._camera)
+        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA.value, WRIST)
         if index < 0:
             names = [self._model.camera(i).name for i in range(self._model.ncam)]
             raise CameraError(
-                "the model has no such camera", got=self._camera, allowed=names or "none in this model"
+                "the model has no such camera", got=WRIST, allowed=names or "none in this model"
             )
         return transform(data.cam_xmat[index].reshape(3, 3) @ _MUJOCO_TO_OPENCV, data.cam_xpos[index])
 
     def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
-        """What the sensor reports from the model's camera, noise included unless it is None."""
+        """Depth that the sensor reports from the model's camera, noise included unless it is None."""
         return self.render(data, self.pose(data), rng)
-
-    def true_frame(self, data: mujoco.MjData) -> DepthFrame:
-        """Perfect depth from the model's camera."""
-        return self.render(data, self.pose(data))
 
     def render(
         self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator | None = None
@@ -113,7 +107,7 @@ class WristCamera:
     def render_both(
         self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator
     ) -> tuple[DepthFrame, DepthFrame]:
-        """What the sensor reports from `T_world_camera` (4, 4), and the perfect depth of the same image."""
+        """Depth that the sensor reports from `T_world_camera` (4, 4), and the perfect depth of that image."""
         true = self._depth(data, T_world_camera)
         reported = self._frame(data, T_world_camera, self._measured(true, rng))
         return reported, replace(reported, depth=self._window(true))
@@ -182,7 +176,7 @@ def _require_colour(backend: str) -> None:
 
 
 def has_colour(backend: str) -> bool:
-    """Whether a camera of that backend can see colour here: only OpenGL renders it.
+    """True if a camera of that backend can see colour here: only OpenGL renders it.
 
     Raises:
         CameraError: backend "gl" without GL.
@@ -191,7 +185,7 @@ def has_colour(backend: str) -> bool:
 
 
 def _gl_usable(backend: str) -> bool:
-    """Whether GL works here; under "gl" it must, under "auto" the log says once that it does not."""
+    """True if GL works here; under "gl" it must, under "auto" the log says once that it does not."""
     if backend == "gl":
         require_gl()
         return True

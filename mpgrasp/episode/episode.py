@@ -23,9 +23,10 @@ from mpgrasp.episode.metrics import ReachMetrics
 from mpgrasp.episode.result import EpisodeResult
 from mpgrasp.geometry import FloatArray, invert, looking_down
 from mpgrasp.grasp import Grasp, GraspMap
-from mpgrasp.motion.arm_driver import ArmDriver, MotionStatistics
+from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution import execute_grasp
 from mpgrasp.motion.ik import solve_pose
+from mpgrasp.motion.motion_statistics import MotionStatistics
 from mpgrasp.outcome import Outcome
 from mpgrasp.recording.recorder import NullRecorder, Recorder, TickRecord
 from mpgrasp.scene.config import SceneConfig

@@ -1,4 +1,4 @@
-"""The way of the arm: inverse kinematics, protective stops, and the execution of a grasp."""
+"""Motion of the arm: inverse kinematics, protective stops, and the execution of a grasp."""
 
 from __future__ import annotations
 

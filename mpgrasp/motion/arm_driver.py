@@ -10,49 +10,22 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.motion.ik import DifferentialIK, IkSolution
-from mpgrasp.motion.reflex import Reflex, ReflexMonitor
-from mpgrasp.motion.time_scaling import paced_profile
+from mpgrasp.motion.ik import DifferentialIK
+from mpgrasp.motion.ik_solution import IkSolution
+from mpgrasp.motion.motion_statistics import MotionMeter, MotionStatistics
+from mpgrasp.motion.reflex import MeasuredArm, Reflex, ReflexMonitor
+from mpgrasp.motion.time_scaling import scaled_profile
 from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, integrate_pose, pose_error
 from mpgrasp.scene.simulation import Simulation
 
 FORCE_WINDOW = 5
 """Ticks over which the external force is averaged before it can stop the arm. The arm weighs some 20 kg as
 seen from the tool; touching a hard table at 0.05 m/s is 1 N s, 100 N over one tick, and breaks nothing."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotionStatistics:
-    """What the arm did since the driver was reset."""
-
-    duration: float
-    """[s]"""
-    path_length: float
-    """Of the measured tool point [m]."""
-    min_singular_value: float
-    """Smallest so far."""
-    near_singularity: float
-    """Time spent below the warning level [s]."""
-    max_acceleration: float
-    """Largest commanded acceleration of the tool point [m/s2]."""
-    max_joint_acceleration: FloatArray
-    """(7,) largest commanded accelerations [rad/s2]."""
-    max_joint_velocity: FloatArray
-    """(7,) largest demanded velocities [rad/s]."""
-    jerk_rms: float
-    """Of the measured tool point at the loop's rate [m/s3]."""
-    max_tracking_error: float
-    """Largest distance from desired to measured tool point [m]."""
-    ik_seconds: float
-    """Wall time spent in IK [s]."""
-    physics_seconds: float
-    """Wall time spent in physics [s]."""
 
 
 OnTick = Callable[["ArmDriver"], None]
@@ -93,18 +66,13 @@ class ArmDriver:
         self.q = np.array(self.simulation.q, float)
         self.T_desired = self.ik.pose(self.q)
         self.solution: IkSolution | None = None
-        self._start = self.simulation.time
-        self._dq: FloatArray = np.zeros(7)
-        self._twist: FloatArray = np.zeros(6)
         self._forces: deque[FloatArray] = deque([np.zeros(3)] * FORCE_WINDOW, maxlen=FORCE_WINDOW)
-        self._velocities: deque[FloatArray] = deque(maxlen=3)
-        self._position = np.array(self.simulation.T_world_tcp[:3, 3])
-        self._path_length = self._jerk_sum = self._near = 0.0
-        self._jerk_count = 0
-        self._max_acceleration = self._max_tracking = 0.0
-        self._max_ddq, self._max_dq = np.zeros(7), np.zeros(7)
-        self._min_singular_value = float(np.linalg.svd(self.ik.jacobian(self.q), compute_uv=False)[-1])
-        self._ik_seconds = self._physics_seconds = 0.0
+        self._meter = MotionMeter(
+            self.config,
+            self.simulation.time,
+            self.simulation.T_world_tcp[:3, 3],
+            float(np.linalg.svd(self.ik.jacobian(self.q), compute_uv=False)[-1]),
+        )
 
     @property
     def reflex(self) -> Reflex | None:
@@ -114,7 +82,7 @@ class ArmDriver:
     @property
     def twist_commanded(self) -> FloatArray:
         """(6,) twist that the last tick asked for, world axes [m/s, rad/s]."""
-        return self._twist
+        return self._meter.twist
 
     @property
     def twist_achieved(self) -> FloatArray:
@@ -133,12 +101,12 @@ class ArmDriver:
 
     @property
     def min_singular_value(self) -> float:
-        """Of the tool Jacobian, now."""
+        """Smallest singular value of the tool Jacobian, now; NaN before the first tick."""
         return np.nan if self.solution is None else self.solution.min_singular_value
 
     @property
     def manipulability(self) -> float:
-        """Of the tool Jacobian, now."""
+        """Manipulability of the tool Jacobian, now; NaN before the first tick."""
         return np.nan if self.solution is None else self.solution.manipulability
 
     def drive(self, twist: FloatArray, duration: float, on_tick: OnTick | None = None) -> Reflex | None:
@@ -199,7 +167,7 @@ class ArmDriver:
         """
         self.stop(on_tick)
         start, error = self.T_desired, pose_error(self.T_desired, T_world_tcp)
-        shares = paced_profile(
+        shares = scaled_profile(
             self.ik, self.q, start, error, self.config,
             max_speed or self.config.max_speed, max_rotation or self.config.max_rotation,
         )  # fmt: skip
@@ -231,20 +199,8 @@ class ArmDriver:
         return self.reflex
 
     def statistics(self) -> MotionStatistics:
-        """What the arm did since `reset`."""
-        return MotionStatistics(
-            duration=self.simulation.time - self._start,
-            path_length=self._path_length,
-            min_singular_value=self._min_singular_value,
-            near_singularity=self._near,
-            max_acceleration=self._max_acceleration,
-            max_joint_acceleration=self._max_ddq.copy(),
-            max_joint_velocity=self._max_dq.copy(),
-            jerk_rms=float(np.sqrt(self._jerk_sum / self._jerk_count)) if self._jerk_count else 0.0,
-            max_tracking_error=self._max_tracking,
-            ik_seconds=self._ik_seconds,
-            physics_seconds=self._physics_seconds,
-        )
+        """Figures of the arm's motion since `reset`."""
+        return self._meter.statistics(self.simulation.time)
 
     def _tick(self, T_desired: FloatArray, on_tick: OnTick | None) -> None:
         c, sim = self.config, self.simulation
@@ -255,18 +211,19 @@ class ArmDriver:
         clock = time.perf_counter()
         self.solution = self.ik.step(self.q, T_desired, c.dt)
         self.q = self.q + self.solution.dq * c.dt
-        self._ik_seconds += time.perf_counter() - clock
+        self._meter.ik_seconds += time.perf_counter() - clock
         clock = time.perf_counter()
         sim.set_arm_target(self.q, self.solution.dq)
         sim.step(self.steps_per_tick)
-        self._physics_seconds += time.perf_counter() - clock
+        self._meter.physics_seconds += time.perf_counter() - clock
         T, achieved = sim.T_world_tcp, sim.twist_tcp
         self._forces.append(sim.external_force)
-        self._observe(twist, T, achieved)
-        self.monitor.check(
-            time=sim.time, dt=c.dt, solution=self.solution, q=sim.q, dq=sim.dq, twist=achieved,
-            T_world_tcp=T, T_world_tcp_desired=T_desired, contact_force=self.external_force,
+        self._meter.observe(twist, self.solution, T[:3, 3], T_desired[:3, 3], achieved[:3])
+        arm = MeasuredArm(
+            time=sim.time, q=sim.q, dq=sim.dq, twist=achieved, T_world_tcp=T,
+            contact_force=self.external_force,
         )  # fmt: skip
+        self.monitor.check(arm, self.solution, T_desired, c.dt)
         if self.reflex is not None:
             # brakes on: hold where the arm is
             self.q = np.array(sim.q, float)
@@ -274,23 +231,3 @@ class ArmDriver:
             sim.set_arm_target(self.q, np.zeros(7))
         if on_tick is not None:
             on_tick(self)
-
-    def _observe(self, twist: FloatArray, T: FloatArray, achieved: FloatArray) -> None:
-        assert self.solution is not None
-        c, s = self.config, self.solution
-        acceleration = float(np.linalg.norm(twist[:3] - self._twist[:3])) / c.dt
-        self._max_acceleration = max(self._max_acceleration, acceleration)
-        self._twist = twist
-        self._max_ddq = np.maximum(self._max_ddq, np.abs(s.dq - self._dq) / c.dt)
-        self._max_dq = np.maximum(self._max_dq, np.abs(s.demanded_dq))
-        self._dq = s.dq
-        self._min_singular_value = min(self._min_singular_value, s.min_singular_value)
-        self._near += c.dt * (s.min_singular_value < c.singularity_warning)
-        self._path_length += float(np.linalg.norm(T[:3, 3] - self._position))
-        self._position = np.array(T[:3, 3])
-        self._max_tracking = max(self._max_tracking, float(np.linalg.norm(T[:3, 3] - self.T_desired[:3, 3])))
-        self._velocities.append(np.array(achieved[:3]))
-        if len(self._velocities) == 3:
-            a, b, d = self._velocities
-            self._jerk_sum += float(np.sum((a - 2 * b + d) ** 2)) / c.dt**4
-            self._jerk_count += 1

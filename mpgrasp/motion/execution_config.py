@@ -1,4 +1,4 @@
-"""How a chosen grasp is executed and judged: speeds, forces, times and heights."""
+"""Settings of an execution: speeds, forces, times and heights, and the height that counts as success."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mpgrasp.robot import hand
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutionConfig:
-    """How a grasp is executed and judged."""
+    """Speeds, forces, times and heights by which a grasp is executed and judged."""
 
     opening_margin: float = 0.01
     """Added to the grasp's width before the descent [m]."""
@@ -27,7 +27,7 @@ class ExecutionConfig:
     entry_height: float = 0.005
     """Height of the finger tips over the seen surface at which that begins [m]."""
     guarded_speed: float = 0.02
-    """Of the last millimetres, where contact with the support is expected [m/s]."""
+    """Speed of the last millimetres, where contact with the support is expected [m/s]."""
     guarded_height: float = 0.010
     """Height of the finger tips over the table at which those begin [m]."""
     support_band: float = 0.006
@@ -42,9 +42,9 @@ class ExecutionConfig:
     palm_depth: float = 0.042
     """Deepest reach of the tips below the seen surface [m]; the palm is 45 mm above them."""
     overtravel: float = 0.002
-    """How far below the table's plane the search for contact may go [m]."""
+    """Depth below the table's plane to which the search for contact may go [m]."""
     grip_force: float = hand.GRIPPER_FORCE_DEFAULT
-    """Of each pad [N]."""
+    """Force of each pad [N]."""
     settle_time: float = 2.5
     """Longest wait for the gripper to come to rest [s]."""
     lift: float = 0.15
@@ -58,7 +58,7 @@ class ExecutionConfig:
     shake_frequency: float = 3.0
     """[Hz]; with the amplitude, peaks of 1.8 m/s2."""
     shake_time: float = 0.7
-    """Of each of the two shakes, sideways and up and down [s]; 0 = not shaken."""
+    """Duration of each of the two shakes, sideways and up and down [s]; 0 = not shaken."""
     settle_after_shake: float = 0.2
     """[s]"""
     success_height: float = 0.05

@@ -11,7 +11,6 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import mink
@@ -20,81 +19,12 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.motion.ik_config import IkConfig
+from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.trajectory import integrate_pose, pose_error
 from mpgrasp.robot import panda
 
 TCP_SITE = "tcp"
-
-
-@dataclass(frozen=True, kw_only=True)
-class IkConfig:
-    """Weights and limits of the quadratic program."""
-
-    damping: float = 1e-7
-    """Levenberg-Marquardt damping. So small that it costs less than 0.01 % of a motion at a singular
-    value of 0.05: near a singularity the velocity grows until a reflex names it."""
-    posture_cost: float = 1e-2
-    """Weight of the elbow posture against 1 for the tool pose: enough for the null space only."""
-    posture_rate: float = 0.2
-    """How fast the elbow swings home within the null space [1/s]."""
-    posture_smoothing: float = 0.5
-    """Time constant with which that motion sets in, so that it starts without a jerk [s]."""
-    joint_margin: float = 0.01
-    """Distance that the commanded position keeps from the joint limits [rad]."""
-    velocity_fraction: float = 1.0
-    """Share of the FER's joint velocity that the program may use."""
-    collision_distance: float = 0.01
-    """Least distance between hand and own arm, and between hand and table [m]."""
-    collision_range: float = 0.05
-    """Distance at which collision limits set in [m]."""
-    collision_rate: float = 10.0
-    """Approach to `collision_distance` slows down at this rate [1/s]."""
-    collisions: bool = True
-    """Whether to avoid collisions at all."""
-
-    def __post_init__(self) -> None:
-        for name in ("damping", "posture_cost", "posture_rate", "joint_margin"):
-            if getattr(self, name) < 0:
-                raise ConfigError(f"{name} must not be negative", got=getattr(self, name))
-        for name in ("posture_smoothing", "collision_rate"):
-            if getattr(self, name) <= 0:
-                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
-        if not 0 < self.velocity_fraction <= 1:
-            raise ConfigError("velocity_fraction is a share", got=self.velocity_fraction, allowed="(0, 1]")
-        if not 0 < self.collision_distance < self.collision_range:
-            raise ConfigError(
-                "collision_distance must lie within collision_range",
-                got=self.collision_distance,
-                allowed=f"(0, {self.collision_range})",
-            )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class IkSolution:
-    """One tick of differential IK."""
-
-    dq: FloatArray
-    """(7,) joint velocity to command [rad/s]; zero where the program had no solution."""
-    demanded_dq: FloatArray
-    """(7,) least-norm joint velocity that the motion needs without any limit [rad/s]."""
-    manipulability: float
-    """sqrt(det(J J^T)) of the (6, 7) tool Jacobian in m and rad: the product of its singular values."""
-    min_singular_value: float
-    """Smallest singular value of the same Jacobian."""
-    feasible: bool = True
-    """False where the quadratic program had no solution."""
-    residual: float = 0.0
-    """Distance that is left to the desired position after this tick [m]."""
-    residual_angle: float = 0.0
-    """Angle that is left to the desired orientation after this tick [rad]."""
-    blocked: str | None = None
-    """The limit that holds the motion back: joint_position, joint_velocity or collision_avoidance."""
-    blocked_joint: int | None = None
-    """1..7 where `blocked` is a joint's limit."""
-    blocked_value: float = 0.0
-    """Demanded velocity, commanded position or distance at that limit [rad/s, rad, m]."""
-    blocked_bound: float = 0.0
-    """What the limit allows, same unit."""
 
 
 @cache

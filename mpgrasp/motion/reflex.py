@@ -1,4 +1,4 @@
-"""Protective stops: which limit of the FER was broken, by which joint, by how much.
+"""Protective stops: the limit of the FER that was broken, by which joint, by how much.
 
 A real Franka has no "singularity" stop. Near a singularity a Cartesian velocity asks for joint
 velocities or accelerations that the arm does not have, and that is what stops it. So the monitor
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector
-from mpgrasp.motion.ik import IkSolution
+from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.robot import panda
 
 UNITS = {
@@ -45,9 +45,9 @@ class Reflex:
     joint: int | None
     """1..7, or None where the limit is not a joint's."""
     value: float
-    """What was measured or demanded, in the limit's unit."""
+    """Value that was measured or demanded, in the limit's unit."""
     bound: float
-    """What is allowed, in the limit's unit."""
+    """Largest value that is allowed, in the limit's unit."""
     time: float
     """Simulated time [s]."""
     demanded: bool = False
@@ -76,18 +76,18 @@ class ReflexConfig:
     dq_max: FloatArray = field(default_factory=lambda: _fer("DQ_MAX"))
     """(7,) [rad/s]"""
     ddq_max: FloatArray = field(default_factory=lambda: _fer("DDQ_MAX"))
-    """(7,) of the commanded velocity [rad/s2]"""
+    """(7,) rate of the commanded velocity [rad/s2]"""
     cartesian_velocity: float = panda.CARTESIAN_SPEED_MAX
-    """Of the tool point [m/s]."""
+    """Speed of the tool point [m/s]."""
     cartesian_rotation: float = 2.5
-    """Of the tool [rad/s]."""
+    """Rotation of the tool [rad/s]."""
     tracking_position: float = 0.02
     """Desired to measured tool point [m]. Ordinary motion stays below 2 mm; pressing on the table at
     the contact bound bends the servo by about as much as this."""
     tracking_orientation: float = 0.10
     """Desired to measured orientation [rad]."""
     ik_residual: float = 0.002
-    """How far IK may fall behind the desired pose before the limit that holds it back is named [m];
+    """Distance that IK may fall behind the desired pose before the limit that holds it back is named [m];
     ordinary motion leaves micrometres."""
     ik_residual_angle: float = 0.02
     """The same for orientation [rad]."""
@@ -112,6 +112,24 @@ class ReflexConfig:
                 raise ConfigError(f"{name} must be positive", got=getattr(self, name))
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredArm:
+    """State of the arm as measured at the end of a tick."""
+
+    time: float
+    """Simulated time [s]."""
+    q: FloatArray
+    """(7,) joint positions [rad]"""
+    dq: FloatArray
+    """(7,) joint velocities [rad/s]"""
+    twist: FloatArray
+    """(6,) velocity of the tool point, world axes [m/s, rad/s]"""
+    T_world_tcp: FloatArray
+    """(4, 4) pose of the tool point."""
+    contact_force: float
+    """External force on the robot [N]."""
+
+
 class ReflexMonitor:
     """Watches every tick of the velocity loop; the first violation latches until `reset`."""
 
@@ -126,30 +144,15 @@ class ReflexMonitor:
         self._dq_commanded = None
 
     def check(
-        self,
-        *,
-        time: float,
-        dt: float,
-        solution: IkSolution,
-        q: FloatArray,
-        dq: FloatArray,
-        twist: FloatArray,
-        T_world_tcp: FloatArray,
-        T_world_tcp_desired: FloatArray,
-        contact_force: float,
+        self, arm: MeasuredArm, solution: IkSolution, T_world_tcp_desired: FloatArray, dt: float
     ) -> Reflex | None:
-        """Look at one tick.
+        """Judge one tick.
 
         Args:
-            time: simulated time [s].
-            dt: time since the last call [s].
-            solution: what IK commanded and what the motion had demanded of it.
-            q: measured positions (7,) [rad].
-            dq: measured velocities (7,) [rad/s].
-            twist: measured velocity of the tool point (6,), world axes [m/s, rad/s].
-            T_world_tcp: measured pose (4, 4).
+            arm: what was measured at the end of the tick.
+            solution: what IK made of the tick.
             T_world_tcp_desired: pose (4, 4) that the motion wanted at the end of the tick.
-            contact_force: external force on the robot [N].
+            dt: length of the tick [s].
 
         Returns:
             The first violation since `reset`, or None.
@@ -159,22 +162,22 @@ class ReflexMonitor:
             # the arm rests before its first command
             ddq = (self._dq_commanded - (0.0 if previous is None else previous)) / dt
             self.reflex = (
-                self._joints(time, q, dq, ddq)
-                or self._demands(time, solution)
-                or self._cartesian(time, twist, T_world_tcp, T_world_tcp_desired)
+                self._joints(arm, ddq)
+                or self._demands(arm.time, solution)
+                or self._cartesian(arm, T_world_tcp_desired)
             )
-            if self.reflex is None and contact_force > self.config.contact_force:
-                self.reflex = _reflex("contact_force", time, contact_force, self.config.contact_force)
+            if self.reflex is None and arm.contact_force > self.config.contact_force:
+                self.reflex = _reflex("contact_force", arm.time, arm.contact_force, self.config.contact_force)
         return self.reflex
 
-    def _joints(self, time: float, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reflex | None:
-        c = self.config
+    def _joints(self, arm: MeasuredArm, ddq: FloatArray) -> Reflex | None:
+        c, q = self.config, arm.q
         for j in range(7):
             if not c.q_min[j] <= q[j] <= c.q_max[j]:
                 bound = c.q_min[j] if q[j] < c.q_min[j] else c.q_max[j]
-                return _reflex("joint_position", time, q[j], bound, joint=j + 1)
-        return _worst("joint_velocity", time, dq, c.dq_max) or _worst(
-            "joint_acceleration", time, ddq, c.ddq_max
+                return _reflex("joint_position", arm.time, q[j], bound, joint=j + 1)
+        return _worst("joint_velocity", arm.time, arm.dq, c.dq_max) or _worst(
+            "joint_acceleration", arm.time, ddq, c.ddq_max
         )
 
     def _demands(self, time: float, solution: IkSolution) -> Reflex | None:
@@ -199,13 +202,11 @@ class ReflexMonitor:
             "tracking_orientation", time, solution.residual_angle, c.ik_residual_angle, demanded=True
         )
 
-    def _cartesian(
-        self, time: float, twist: FloatArray, T: FloatArray, T_desired: FloatArray
-    ) -> Reflex | None:
-        c = self.config
+    def _cartesian(self, arm: MeasuredArm, T_desired: FloatArray) -> Reflex | None:
+        c, T = self.config, arm.T_world_tcp
         for limit, value, bound in (
-            ("cartesian_velocity", np.linalg.norm(twist[:3]), c.cartesian_velocity),
-            ("cartesian_rotation", np.linalg.norm(twist[3:]), c.cartesian_rotation),
+            ("cartesian_velocity", np.linalg.norm(arm.twist[:3]), c.cartesian_velocity),
+            ("cartesian_rotation", np.linalg.norm(arm.twist[3:]), c.cartesian_rotation),
             ("tracking_position", np.linalg.norm(T_desired[:3, 3] - T[:3, 3]), c.tracking_position),
             (
                 "tracking_orientation",
@@ -214,7 +215,7 @@ class ReflexMonitor:
             ),
         ):
             if value > bound:
-                return _reflex(limit, time, value, bound)
+                return _reflex(limit, arm.time, value, bound)
         return None
 
 

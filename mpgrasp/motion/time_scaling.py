@@ -1,4 +1,4 @@
-"""How much slower a straight-line move must be for every joint to keep its limits.
+"""Time scaling of straight-line moves: as slow as every joint needs it to keep its limits.
 
 The motion planner of a real arm times a path by its joints, not only by its tool: near a singularity a
 slow tool means fast joints. A move is therefore rehearsed on the arm's kinematics before it is made. What
@@ -22,7 +22,7 @@ STRIDE = 4
 """Ticks between two looks at the joints; a profile's acceleration changes over `MotionConfig.smoothing`."""
 
 
-def paced_profile(
+def scaled_profile(
     ik: DifferentialIK,
     q: FloatArray,
     T_start: FloatArray,
@@ -57,7 +57,7 @@ def slowdown(
     config: MotionConfig,
 ) -> float:
     """Factor, 1 or more, by which a move with these shares (n,) must take longer to leave the joints their
-    margin; the other arguments are those of `paced_profile`.
+    margin; the other arguments are those of `scaled_profile`.
 
     Returns:
         The factor, `MotionConfig.max_slowdown` at most: a path through a singularity itself would have

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, rotation_vector, transform, wrap_half_pi
+from mpgrasp.geometry import FloatArray, rotation_vector, transform
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionConfig:
-    """How briskly the arm moves, and when a singularity is called near."""
+    """Speeds and accelerations of the arm's motion, and the level at which a singularity counts as near."""
 
     dt: float = 0.01
     """Period of the velocity loop [s]."""
@@ -25,9 +25,9 @@ class MotionConfig:
     smoothing: int = 5
     """Ticks over which the ramped velocity is averaged: bounds the jerk at 2 a / (smoothing dt)."""
     max_speed: float = 0.25
-    """Of pose moves [m/s]."""
+    """Speed of pose moves [m/s]."""
     max_rotation: float = 1.5
-    """Of pose moves [rad/s]."""
+    """Rotation of pose moves [rad/s]."""
     joint_fraction: float = 0.8
     """Share of the FER's joint velocity and acceleration that a pose move may use; where it would need
     more it slows down. Ordinary moves within the workspace use less than 0.7; what is left covers the
@@ -37,7 +37,7 @@ class MotionConfig:
     singularity_warning: float = 0.05
     """Smallest singular value of the tool Jacobian (m, rad) below which time counts as near a singularity.
     At the controllers' 0.1 m/s a value of 0.046 = 0.1 / 2.175 is where the worst direction uses up a
-    joint's velocity; the workspace of the paper (0.34 m about x = 0.5) stays above 0.12, and the value
+    joint's velocity; the workspace (`workspace.WORKSPACE_REACH`) stays above 0.12, and the value
     falls through 0.05 at 0.76 to 0.79 m from the base, some 2 cm before the arm is stretched."""
 
     def __post_init__(self) -> None:
@@ -75,7 +75,7 @@ class TwistRamp:
     @property
     def twist(self) -> FloatArray:
         """The ramped twist (6,) of the last tick [m/s, rad/s]."""
-        return np.mean(self._recent, axis=0)
+        return np.asarray(np.mean(self._recent, axis=0))
 
     def step(self, wanted: FloatArray) -> FloatArray:
         """The twist (6,) of the next tick on the way to `wanted` (6,)."""
@@ -119,18 +119,10 @@ def path_profile(
     share = np.cumsum(velocity)
     if share[-1] <= 0:
         return np.ones(1)  # a move so short that it fits into one tick
-    return share / share[-1]
+    return np.asarray(share / share[-1])
 
 
-def nearest_yaw(angle: float, yaw: float) -> float:
-    """The heading [rad] of grasp line `angle` that lies within 90 degrees of heading `yaw`.
-
-    A grasp is the same after half a turn; the far one sends differential IK the long way round.
-    """
-    return yaw + float(wrap_half_pi(angle - yaw))
-
-
-def shake(t: float, amplitude: float, frequency: float, duration: float) -> float:
+def shake_offset(t: float, amplitude: float, frequency: float, duration: float) -> float:
     """Offset [m] at time t [s] of an oscillation [Hz] that swells and fades, at rest at both ends."""
     return float(amplitude * np.sin(np.pi * t / duration) ** 2 * np.sin(2 * np.pi * frequency * t))
 

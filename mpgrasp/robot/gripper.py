@@ -27,7 +27,7 @@ class GripperDrive:
         self._stiffness = float(model.actuator_gainprm[actuator, 0])
         self._dt = float(model.opt.timestep)
         self.force: float | None = None
-        """Of each pad while grasping [N]; None while the gripper holds a width."""
+        """Force of each pad while grasping [N]; None while the gripper holds a width."""
         self.target = hand.GRIPPER_MAX_WIDTH
         """Commanded opening [m]."""
 

@@ -19,7 +19,7 @@ from mpgrasp.paths import PANDA_ASSETS
 from mpgrasp.robot import hand
 
 PREFIX = "panda/"
-"""Where the robot is attached to a world, its elements carry this prefix."""
+"""Prefix of the robot's elements in a world to which it is attached."""
 ROBOT_GROUP = 2
 """Geom group of everything that belongs to the robot, and of nothing else."""
 
@@ -43,8 +43,6 @@ DQ_MAX = _constant(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)
 """(7,) [rad/s]"""
 DDQ_MAX = _constant(15, 7.5, 10, 12.5, 15, 20, 20)
 """(7,) [rad/s2]"""
-TORQUE_MAX = _constant(87, 87, 87, 87, 12, 12, 12)
-"""(7,) [N m]"""
 CARTESIAN_SPEED_MAX = 1.7
 """Translation of the tool [m/s]."""
 

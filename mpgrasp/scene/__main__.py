@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mpgrasp.command_line import Parser, run_command
-from mpgrasp.scene.export import save_scene
-from mpgrasp.scene.scene import build_scene
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,6 +28,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         "--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)"
     )
     options = parser.parse_args(arguments)
+    # after the arguments: help needs no MuJoCo
+    from mpgrasp.scene.export import save_scene
+    from mpgrasp.scene.scene import build_scene
     from mpgrasp.suite import episode_seed, load_suite
 
     suite = load_suite(options.suite)

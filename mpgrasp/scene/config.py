@@ -1,4 +1,4 @@
-"""Settings of a scene: what lies on the table, and how it got there."""
+"""Settings of a scene: the objects on the table, the way they are placed, the cloth."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from mpgrasp.workspace import WORKSPACE_CENTRE
 
 @dataclass(frozen=True, kw_only=True)
 class SceneConfig:
-    """What lies on the table, and how it got there."""
+    """Objects on the table, the way they are placed, and the cloth below them."""
 
     objects: tuple[str | ObjectModel, ...] = ("usb_stick",)
     """Names from the catalogue, or objects."""
     count: int | None = None
-    """How many of them, drawn by the seed without putting back; None = all of them, in order."""
+    """Number of them, drawn by the seed without replacement; None = all of them, in order."""
     placing: Literal["scatter", "pile", "stack"] = "scatter"
     """Next to each other, dropped one after the other near the centre, or set down in a fixed pattern."""
     pattern: tuple[tuple[float, float, float], ...] = ()
-    """Of a stack: x, y from the centre [m] and heading [rad] of each object; every object comes to lie on
-    those before it."""
+    """Places in a stack: x, y from the centre [m] and heading [rad] of each object; every object comes to lie
+    on those before it."""
     jitter: tuple[float, float] = (0.003, 0.05)
-    """Of a stack: largest deviation from the pattern in x and in y [m], and in heading [rad]."""
+    """Largest deviation of a stack from its pattern in x and in y [m], and in heading [rad]."""
     pose: Literal["upright", "random"] = "upright"
     """Dropped as meant to stand or lie, or in any orientation; yaw is always random."""
     centre: tuple[float, float] = WORKSPACE_CENTRE

@@ -14,27 +14,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, looking_down, transform
+from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.robot import hand, panda
-from mpgrasp.robot.contacts import Contacts
-from mpgrasp.robot.gripper import GripperDrive
+from mpgrasp.scene.moving_scene import MovingScene
 from mpgrasp.scene.objects.model import OBJECT_GROUP
 from mpgrasp.scene.scene import SLEEP_TOLERANCE, STATE, Scene
 
 JOINTS = ("x", "y", "z", "yaw")
 """World position of the tool point [m] and heading of the hand's x axis about world z [rad]."""
 STIFFNESS = (5600.0, 5000.0, 8500.0, 650.0)
-"""What one axis of the tool point yields to, all others being free [N/m, N m/rad]: 1 / diag(J Kq^-1 J^T) for
-the arm's servo stiffness Kq, tool down over the middle of the workspace."""
+"""Stiffness of the tool point along each axis, all others being free [N/m, N m/rad]: 1 / diag(J Kq^-1 J^T)
+for the arm's servo stiffness Kq, tool down over the middle of the workspace."""
 DAMPING = (240.0, 235.0, 420.0, 18.0)
 """The same for the servo's damping [N s/m, N m s/rad]."""
 INERTIA = (3.4, 4.8, 8.5, 0.12)
 """The same for the arm's joint-space inertia [kg, kg m2], hand included."""
 
 STILL_SPEED = 1e-4
-"""[m/s]"""
+"""Speed below which an object does not creep [m/s]."""
 STILL_RATE = 1e-3
-"""[rad/s]"""
+"""The same for its rotation [rad/s]."""
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, -1.0))  # in the hand's frame
 
@@ -77,7 +76,7 @@ def _own_inertia(hand: mujoco.MjsBody) -> float:
     return float(hand.mass + sum(_own_inertia(body) for body in hand.bodies))
 
 
-class FreeGripper:
+class FreeHand(MovingScene):
     """One scene in motion, with a free-flying hand in it.
 
     Args:
@@ -92,13 +91,10 @@ class FreeGripper:
             raise ConfigError(
                 "the scene has a robot", got=scene.objects, allowed="build_scene(..., robot=False)"
             )
-        self.scene = _with_hand(scene)
-        self.model = self.scene.model
-        self.data = mujoco.MjData(self.model)
-        self._contacts = Contacts(self.model, self.data, scene.objects)
+        super().__init__(_with_hand(scene))
         self._index()
         self.reset()
-        self._refresh()
+        self.refresh()
         self.top = self._highest()
         """Height of the settled objects' highest point [m], or a little above it."""
 
@@ -118,7 +114,7 @@ class FreeGripper:
         self._stale = True
 
     def touches(self) -> bool:
-        """Whether a part of the hand touches anything, where it is now."""
+        """True if a part of the hand touches anything, where it is now."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
         self._stale = True
@@ -142,7 +138,7 @@ class FreeGripper:
         self._stale = True
 
     def are_still(self, names: Sequence[str]) -> bool:
-        """Whether none of these objects moves faster than `STILL_SPEED` and `STILL_RATE`."""
+        """True if none of these objects moves faster than `STILL_SPEED` and `STILL_RATE`."""
         rows = [self.scene.objects.index(name) for name in names]
         v = np.abs(self.data.qvel[self._free_dofs[rows]])  # (n, 6)
         return bool((v[:, :3] < STILL_SPEED).all() and (v[:, 3:] < STILL_RATE).all())
@@ -151,11 +147,6 @@ class FreeGripper:
     def external_force(self) -> FloatArray:
         """Net contact force (3,) on the hand [N], world axes, as a mean over the last `step`."""
         return self._force
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return float(self.data.time)
 
     @property
     def T_world_tcp(self) -> FloatArray:
@@ -173,46 +164,6 @@ class FreeGripper:
         """Distance from where the tool point should be to where it is [m]."""
         return float(np.linalg.norm(self._qpos[:3] - self._target[:3]))
 
-    @property
-    def gripper_width(self) -> float:
-        """Opening between the pads [m]."""
-        return self._gripper.width
-
-    def open_gripper(self, width: float = hand.GRIPPER_MAX_WIDTH) -> None:
-        """As `Simulation.open_gripper`."""
-        self._gripper.open(width)
-
-    def close_gripper(self, force: float = hand.GRIPPER_FORCE_DEFAULT) -> None:
-        """As `Simulation.close_gripper`.
-
-        Raises:
-            ConfigError: a force that the hand cannot hold continuously.
-        """
-        self._gripper.close(force)
-
-    def pad_contacts(self) -> tuple[set[str], set[str]]:
-        """Names of the objects that press against the face of the left and of the right pad."""
-        self._refresh()
-        return self._contacts.pads()
-
-    def object_pose(self, name: str) -> FloatArray:
-        """Pose (4, 4) of an object's body frame in the world.
-
-        Raises:
-            ConfigError: the scene has no such object.
-        """
-        if name not in self.scene.objects:
-            raise ConfigError("unknown object", got=name, allowed=self.scene.objects)
-        self._refresh()
-        body = self.data.body(name)
-        return transform(body.xmat.reshape(3, 3), body.xpos)
-
-    def _refresh(self) -> None:
-        """MuJoCo's step leaves poses and contacts one time step behind the joint positions."""
-        if self._stale:
-            mujoco.mj_forward(self.model, self.data)
-            self._stale = False
-
     def _highest(self) -> float:
         model, data = self.model, self.data
         mine = np.flatnonzero(model.geom_group == OBJECT_GROUP)
@@ -228,7 +179,6 @@ class FreeGripper:
         self._constraint = data.qfrc_constraint[v : v + 3]
         drive = model.actuator(prefix + JOINTS[0]).id
         self._ctrl = data.ctrl[drive : drive + 4]
-        self._gripper = GripperDrive(model, data)
         self._dt = float(model.opt.timestep)
         free = [model.joint(f"{name}/free").dofadr[0] for name in self.scene.objects]
         self._free_dofs = np.array(free, int)[:, None] + np.arange(6)

@@ -17,7 +17,8 @@ from mpgrasp.scene.cloth import RGBA as CLOTH_RGBA
 from mpgrasp.scene.cloth import Cloth, add_cloth, make_cloth
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.catalogue import load_object
-from mpgrasp.scene.objects.model import OBJECT_GROUP, ObjectModel, add_object
+from mpgrasp.scene.objects.free_body import add_object
+from mpgrasp.scene.objects.model import OBJECT_GROUP, ObjectModel
 from mpgrasp.scene.settling import Settler
 from mpgrasp.workspace import WORKSPACE_CENTRE
 
@@ -26,7 +27,7 @@ SLEEP_TOLERANCE = 1e-3
 size]; whatever moves and touches it wakes it, with all that it touches."""
 _SKY = 2.0  # [m], height from which the rays of a height map are cast
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-"""What `Scene.state` holds."""
+"""Parts of MuJoCo's state that `Scene.state` holds."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,7 +36,7 @@ class Scene:
 
     model: mujoco.MjModel
     spec: mujoco.MjSpec
-    """What the model was compiled from, objects at rest in their initial poses."""
+    """Source of the compiled model, objects in the poses at rest."""
     state: FloatArray
     """Integration state (mjSTATE_INTEGRATION) at time 0: objects at rest, the arm at home."""
     objects: tuple[str, ...]
@@ -117,20 +118,9 @@ def build_scene(config: SceneConfig, seed: int, *, robot: bool = True) -> Scene:
     spec = _arena(config, cloth)
     for name, model in zip(names, models, strict=True):
         add_object(spec, model, name=name)
-    settler = Settler(
-        model=spec.compile(),
-        names=names,
-        objects=models,
-        cloth=cloth,
-        centre=config.centre,
-        half_extent=config.half_extent,
-        pose=config.pose,
-        rng=drop,
-    )
-    if config.placing == "stack":
-        poses = settler.stack(config.pattern, config.jitter)
-    else:
-        poses = settler.scatter() if config.placing == "scatter" else settler.pile()
+    settler = Settler(model=spec.compile(), names=names, objects=models, cloth=cloth, config=config, rng=drop)
+    place = {"scatter": settler.scatter, "pile": settler.pile, "stack": settler.stack}[config.placing]
+    poses = place()
 
     spec = _arena(config, cloth)
     if robot:

@@ -1,4 +1,4 @@
-"""Seeded placing: where objects are dropped, and stepping until they lie still.
+"""Seeded placing: positions at which objects are dropped, and stepping until they lie still.
 
 Nothing here knows of robots, cameras or detectors: a scene is never drawn again because of what
 somebody could or could not see in it.
@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray
+from mpgrasp.geometry import FloatArray, rotation_from_quaternion
 from mpgrasp.scene.cloth import Cloth
-from mpgrasp.scene.objects.model import ObjectModel, rotation_of
+from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.objects.model import ObjectModel
 
 REGION_TOLERANCE = 0.03
 """An object may roll this far out of the region's edge before it is dropped again [m]."""
@@ -44,15 +44,13 @@ _PARKED = 20.0  # [m] height at which objects wait for their drop
 
 @dataclass
 class Settler:
-    """Drops objects into a robot-free model and steps it until they rest."""
+    """Drops objects into a robot-free model and steps it until they rest, as the scene's settings say."""
 
     model: mujoco.MjModel
     names: Sequence[str]
     objects: Sequence[ObjectModel]
     cloth: Cloth
-    centre: tuple[float, float]
-    half_extent: float
-    pose: Literal["upright", "random"]
+    config: SceneConfig
     rng: np.random.Generator
     data: mujoco.MjData = field(init=False)
 
@@ -78,29 +76,25 @@ class Settler:
             self._step(_DROP_TIME)
         return self._settle(pile=True)
 
-    def stack(self, pattern: Sequence[Sequence[float]], jitter: tuple[float, float]) -> FloatArray:
-        """Set the objects down one after the other, each on what lies below it; poses (n, 7) at rest.
-
-        Args:
-            pattern: (n, 3) of each object: x, y from the centre [m] and heading [rad].
-            jitter: largest deviation of x and y [m], and of the heading [rad].
-        """
+    def stack(self) -> FloatArray:
+        """Set the objects down one after the other, each on what lies below it; poses (n, 7) at rest."""
         for _ in range(_STACK_TRIES):
-            fallen = self._try_stack(np.asarray(pattern, float), jitter)
+            fallen = self._try_stack()
             if fallen is None:
-                return self.data.qpos[self._qpos[:, None] + np.arange(7)].copy()
+                return self._poses()
         raise ConfigError(
             "the stack does not stand",
             got=f"{fallen} left its place",
             allowed=f"a pattern in which all come to rest within {STACK_SHIFT:g} m and {STACK_TILT:g} rad",
         )
 
-    def _try_stack(self, pattern: FloatArray, jitter: tuple[float, float]) -> str | None:
+    def _try_stack(self) -> str | None:
         """Name of an object that left its place or does not come to rest, if any."""
+        pattern, jitter = np.asarray(self.config.pattern, float), self.config.jitter
         mujoco.mj_resetData(self.model, self.data)
         self._dropped[:] = False
         shift = self.rng.uniform(-1, 1, (len(pattern), 3)) * [jitter[0], jitter[0], jitter[1]]
-        places = pattern + shift + [*self.centre, 0.0]
+        places = pattern + shift + [*self.config.centre, 0.0]
         set_down = np.empty((len(places), 3))
         self._park()
         for k, (x, y, yaw) in enumerate(places):
@@ -131,10 +125,10 @@ class Settler:
     def _settle(self, *, pile: bool) -> FloatArray:
         for _ in range(_ROUNDS):
             calm = self._step(_ROUND_TIME)
-            away = np.abs(self.data.qpos[self._qpos[:, None] + [0, 1]] - self.centre).max(axis=1)
-            stray = (away > self.half_extent + REGION_TOLERANCE) | ~self._still()
+            away = np.abs(self.data.qpos[self._qpos[:, None] + [0, 1]] - self.config.centre).max(axis=1)
+            stray = (away > self.config.half_extent + REGION_TOLERANCE) | ~self._still()
             if calm and not stray.any():
-                return self.data.qpos[self._qpos[:, None] + np.arange(7)].copy()
+                return self._poses()
             again = [int(k) for k in np.flatnonzero(stray)]
             self._dropped[again] = False
             for k in again:
@@ -150,13 +144,13 @@ class Settler:
         self._put(k, spot, self._orientation())
 
     def _put(self, k: int, spot: FloatArray, quaternion: FloatArray) -> None:
-        points = self.objects[k].points @ rotation_of(quaternion).T
+        points = self.objects[k].points @ rotation_from_quaternion(quaternion).T
         radius = float(np.linalg.norm(points[:, :2], axis=1).max())
         ground = self.cloth.highest(float(spot[0]), float(spot[1]), radius)
         for j in map(int, np.flatnonzero(self._dropped)):
             pose = self._pose(j)
             if np.linalg.norm(pose[:2] - spot) < radius + self._radius[j]:
-                top = (self.objects[j].points @ rotation_of(pose[3:]).T)[:, 2].max()
+                top = (self.objects[j].points @ rotation_from_quaternion(pose[3:]).T)[:, 2].max()
                 ground = max(ground, float(pose[2] + top))
         height = ground - float(points[:, 2].min()) + _DROP_GAP
         a, v = self._qpos[k], self._dof[k]
@@ -169,22 +163,22 @@ class Settler:
         """wxyz; the same number of draws for either kind of pose."""
         yaw = self.rng.uniform(-np.pi, np.pi)
         turn = self.rng.standard_normal(4)
-        if self.pose == "random":
+        if self.config.pose == "random":
             return turn / np.linalg.norm(turn)
         return np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
 
     def _pile_spot(self) -> FloatArray:
         offset = np.clip(self.rng.normal(0.0, 0.3, 2), -1, 1)
-        return np.array(self.centre) + offset * self.half_extent
+        return np.array(self.config.centre) + offset * self.config.half_extent
 
     def _free_spot(self, k: int) -> FloatArray:
         """Position (2,) whose footprint overlaps no other; the roomiest of those tried where all overlap."""
         points = self.objects[k].points
-        radius = np.linalg.norm(points[:, :2] if self.pose == "upright" else points, axis=1).max()
+        radius = np.linalg.norm(points[:, :2] if self.config.pose == "upright" else points, axis=1).max()
         others = self.data.qpos[self._qpos[self._dropped][:, None] + [0, 1]]
-        best, room = np.array(self.centre), -np.inf
+        best, room = np.array(self.config.centre), -np.inf
         for _ in range(_TRIES):
-            spot = np.array(self.centre) + self.rng.uniform(-1, 1, 2) * self.half_extent
+            spot = np.array(self.config.centre) + self.rng.uniform(-1, 1, 2) * self.config.half_extent
             gaps = np.linalg.norm(others - spot, axis=1) - self._radius[self._dropped] - radius
             gap = gaps.min(initial=np.inf)
             if gap > room:
@@ -193,16 +187,21 @@ class Settler:
                 break
         return best
 
+    def _poses(self) -> FloatArray:
+        """Copy (n, 7) of all poses: position [m] and wxyz."""
+        return np.array(self.data.qpos[self._qpos[:, None] + np.arange(7)])
+
     def _pose(self, k: int) -> FloatArray:
-        return self.data.qpos[self._qpos[k] : self._qpos[k] + 7]
+        """View (7,) of one pose: position [m] and wxyz."""
+        return np.asarray(self.data.qpos[self._qpos[k] : self._qpos[k] + 7])
 
     def _still(self) -> NDArray[np.bool_]:
-        """(n,) whether each object is at rest."""
+        """(n,) True where an object is at rest."""
         v = np.abs(self.data.qvel[self._dof[:, None] + np.arange(6)])
-        return (v[:, :3].max(axis=1) < STILL_SPEED) & (v[:, 3:].max(axis=1) < STILL_RATE)
+        return np.asarray((v[:, :3].max(axis=1) < STILL_SPEED) & (v[:, 3:].max(axis=1) < STILL_RATE))
 
     def _step(self, time: float) -> bool:
-        """Step for at most `time` [s]; whether all dropped objects came to rest before."""
+        """Step for at most `time` [s]; True if all dropped objects came to rest before."""
         calm = 0
         for _ in range(round(time / self.model.opt.timestep / _CHECK_STEPS)):
             self._park()  # falls a few centimetres between two checks

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpgrasp.scene.config import SceneConfig
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, line_angle_difference, looking_down, rotation_vector
+from mpgrasp.geometry import FloatArray, looking_down, rotation_vector
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.ik import solve_pose
-from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, nearest_yaw, path_profile
+from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, path_profile
 from mpgrasp.robot.panda import DDQ_MAX, DQ_MAX
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
 
@@ -74,14 +74,6 @@ def test_a_path_profile_rises_to_one_within_its_bounds(length: float, angle: flo
 
 def test_a_path_of_no_length_has_no_ticks() -> None:
     assert len(path_profile(0.0, 0.0, MotionConfig(), 0.25, 1.5)) == 0
-
-
-def test_the_nearest_yaw_is_the_same_line_within_a_quarter_turn() -> None:
-    rng = np.random.default_rng(0)
-    for angle, yaw in rng.uniform(-4, 4, (100, 2)):
-        near = nearest_yaw(angle, yaw)
-        assert abs(near - yaw) <= np.pi / 2 + 1e-12
-        assert line_angle_difference(near, angle) < 1e-9
 
 
 def test_a_straight_reach_and_its_reversals_trip_nothing(scene: Scene) -> None:

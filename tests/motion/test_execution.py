@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpgrasp.outcome import Outcome
-from mpgrasp.scene.config import SceneConfig
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down, wrap_half_pi
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.arm_driver import ArmDriver
-from mpgrasp.motion.execution import OUTCOMES, PHASES, ExecutionConfig, execute_grasp
+from mpgrasp.motion.execution import execute_grasp
+from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.ik import solve_pose
+from mpgrasp.outcome import Outcome
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import ObjectModel, Part
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
@@ -63,9 +64,9 @@ def test_a_thin_stick_on_an_uneven_cloth_is_lifted(height: float, seed: int) -> 
             phases.append(phase)
 
     result = execute_grasp(driver, grasp_of(driver, height, height), on_tick=watch)
-    assert result.outcome == "success", result.reason
+    assert result.outcome is Outcome.SUCCESS, result.reason
     assert (result.lifted, result.between) == ("stick", ("stick",))
-    assert tuple(phases) == PHASES
+    assert phases == ["pregrasp", "descend", "close", "lift", "hold", "shake"]
     assert result.duration < 8.0
     assert result.contact_height is not None
     # felt the cloth, rose a little, and closed below the stick's top
@@ -119,7 +120,7 @@ def test_a_tall_block_is_gripped_as_deep_as_the_palm_allows_and_without_contact(
     model = stick(0.08, width=0.04, length=0.04)
     driver = driver_over(scene_with(model, 0), z=0.3)
     result = execute_grasp(driver, grasp_of(driver, 0.08, 0.04))
-    assert result.outcome == "success", result.reason
+    assert result.outcome is Outcome.SUCCESS, result.reason
     top = result.planned_height + ExecutionConfig().palm_depth
     assert result.contact_height is None
     assert result.tip_height == pytest.approx(top - 0.042, abs=0.001)
@@ -130,13 +131,13 @@ def test_a_tall_block_is_gripped_as_deep_as_the_palm_allows_and_without_contact(
 def test_the_start_may_be_below_the_pregrasp() -> None:
     driver = driver_over(scene_with(stick(0.008), 1), x=0.35, y=0.15, z=0.03)
     result = execute_grasp(driver, grasp_of(driver, 0.008, 0.008))
-    assert result.outcome == "success", result.reason
+    assert result.outcome is Outcome.SUCCESS, result.reason
 
 
 def test_closing_beside_the_object_is_a_miss() -> None:
     driver = driver_over(scene_with(stick(0.008), 0))
     result = execute_grasp(driver, grasp_of(driver, 0.008, 0.008, offset=(0.0, 0.06)))
-    assert result.outcome == "missed"
+    assert result.outcome is Outcome.MISSED
     assert (result.between, result.lifted) == ((), None)
     assert result.width < 0.001
 
@@ -151,7 +152,7 @@ def test_what_hangs_on_the_closed_fingers_like_a_ring_on_a_hook_is_not_grasped()
     grasp = Grasp(position=T[:3, 3] + [0.0, 0.0, 0.07], angle=angle, width=0.016, quality=1.0)
     result = execute_grasp(driver, grasp)
     assert driver.simulation.object_pose("stick")[2, 3] - T[2, 3] > 0.1
-    assert (result.outcome, result.lifted, result.between) == ("missed", None, ())
+    assert (result.outcome, result.lifted, result.between) == (Outcome.MISSED, None, ())
     assert "stick came up hanging on the fingers" in result.reason
 
 
@@ -160,7 +161,7 @@ def test_landing_on_an_object_is_a_collision() -> None:
     driver = driver_over(scene_with(model, 0))
     # fingers come down on top of it: they open to 20 mm over a width of 60
     result = execute_grasp(driver, grasp_of(driver, 0.03, 0.01))
-    assert result.outcome == "collision"
+    assert result.outcome is Outcome.COLLISION
     assert result.contact_height is not None
     assert result.contact_height > 0.025
     assert "planned" in result.reason
@@ -179,7 +180,7 @@ def test_an_object_too_slippery_to_lift_has_slipped() -> None:
         result = execute_grasp(driver, grasp_of(driver, 0.03, 0.03))
     finally:
         simulation_model.geom_friction[:] = before
-    assert result.outcome == "slipped", result.reason
+    assert result.outcome is Outcome.SLIPPED, result.reason
     assert result.between == ("stick",)
 
 
@@ -187,7 +188,7 @@ def test_a_grasp_out_of_reach_ends_in_a_named_reflex() -> None:
     driver = driver_over(scene_with(stick(0.008), 0))
     far = Grasp(position=np.array([0.95, 0.0, 0.01]), angle=0.0, width=0.02, quality=1.0)
     result = execute_grasp(driver, far)
-    assert result.outcome == "reflex"
+    assert result.outcome is Outcome.REFLEX
     assert result.reflex is driver.reflex
     assert result.reflex is not None
     assert result.reflex.limit in result.reason
@@ -203,16 +204,12 @@ def test_the_same_scene_and_grasp_end_in_the_same_state() -> None:
     assert len(hashes) == 1
 
 
-def test_outcomes_are_those_of_an_episode() -> None:
-    assert set(OUTCOMES) < {str(outcome) for outcome in Outcome}
-
-
 @pytest.mark.parametrize(
     "bad", [{"lift_speed": 0.0}, {"grip_force": 100.0}, {"success_height": 0.2}, {"back_off": -0.001}]
 )
 def test_unusable_settings_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(ConfigError):
-        ExecutionConfig(**bad)  # type: ignore[arg-type]
+        ExecutionConfig(**bad)
 
 
 def test_a_grasp_that_is_not_finite_is_refused() -> None:

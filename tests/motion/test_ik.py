@@ -7,7 +7,8 @@ import pytest
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down, rotation_vector
-from mpgrasp.motion.ik import DifferentialIK, IkConfig, solve_pose
+from mpgrasp.motion.ik import DifferentialIK, solve_pose
+from mpgrasp.motion.ik_config import IkConfig
 from mpgrasp.motion.reflex import ReflexConfig
 from mpgrasp.motion.trajectory import integrate_pose, pose_error
 from mpgrasp.robot import panda

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
-from mpgrasp.scene.config import SceneConfig
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down, wrap_half_pi
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.arm_driver import ArmDriver
-from mpgrasp.motion.execution import ExecutionConfig, execute_grasp
+from mpgrasp.motion.execution import execute_grasp
+from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.ik import solve_pose
-from mpgrasp.motion.lift_trial import OUTCOMES, LiftResult, LiftRig
+from mpgrasp.motion.lift_trial import LiftOutcome, LiftResult, LiftRig
+from mpgrasp.outcome import Outcome
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import ObjectModel, Part
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
@@ -58,27 +60,27 @@ def box() -> Scene:
 
 def test_a_box_comes_up_by_its_middle(box: Scene) -> None:
     result = attempt(box, grasp_of(box, BOX[2], BOX[1]))
-    assert (result.outcome, result.lifted) == ("success", "block"), result.reason
+    assert (result.outcome, result.lifted) == (Outcome.SUCCESS, "block"), result.reason
     assert result.rise == pytest.approx(ExecutionConfig().lift, abs=0.005)
     assert 3.0 < result.duration < 8.0
 
 
 def test_the_same_grasp_across_its_long_side_does_not_lift(box: Scene) -> None:
     result = attempt(box, grasp_of(box, BOX[2], 0.07, turn=np.pi / 2))
-    assert result.outcome == "collision"
+    assert result.outcome is Outcome.COLLISION
     assert (result.lifted, result.rise) == (None, 0.0)
 
 
 def test_closing_beside_the_object_is_a_miss(box: Scene) -> None:
     result = attempt(box, grasp_of(box, BOX[2], 0.02, offset=(0.0, 0.08)))
-    assert (result.outcome, result.lifted) == ("missed", None)
+    assert (result.outcome, result.lifted) == (Outcome.MISSED, None)
     assert result.duration < 3.0  # nothing is carried up and shaken
 
 
 def test_a_finger_that_lands_on_the_object_is_a_collision(box: Scene) -> None:
     grasp = grasp_of(box, BOX[2], BOX[1], offset=(0.0, 0.02))
     result = attempt(box, grasp)
-    assert result.outcome == "collision"
+    assert result.outcome is Outcome.COLLISION
     met = re.search(r"met something ([\d.]+) mm", result.reason)
     assert met is not None
     assert float(met[1]) == pytest.approx(1e3 * grasp.position[2], abs=1.5)  # the box's top
@@ -87,29 +89,29 @@ def test_a_finger_that_lands_on_the_object_is_a_collision(box: Scene) -> None:
 def test_a_grasp_seen_far_below_what_stands_there_is_a_collision() -> None:
     tower = scene_with(block(0.05, 0.05, 0.15))
     grasp = grasp_of(tower, -0.10, 0.05)  # the pre-grasp lies inside of the tower
-    assert attempt(tower, grasp).outcome == "collision"
+    assert attempt(tower, grasp).outcome is Outcome.COLLISION
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_stick_of_four_and_a_half_millimetres_on_an_uneven_cloth_is_lifted(seed: int) -> None:
     scene = scene_with(block(0.06, 0.0045, 0.0045), seed=seed)
     result = attempt(scene, grasp_of(scene, 0.0045, 0.0045))
-    assert result.outcome == "success", result.reason
+    assert result.outcome is Outcome.SUCCESS, result.reason
 
 
 def test_what_weighs_more_than_friction_holds_slips() -> None:
     # two pads of 40 N at a friction of 0.3 hold 24 N
     light, heavy = (scene_with(block(*BOX, mass=mass, friction=0.3)) for mass in (1.0, 4.0))
-    assert attempt(light, grasp_of(light, BOX[2], BOX[1])).outcome == "success"
-    assert attempt(heavy, grasp_of(heavy, BOX[2], BOX[1])).outcome == "slipped"
+    assert attempt(light, grasp_of(light, BOX[2], BOX[1])).outcome is Outcome.SUCCESS
+    assert attempt(heavy, grasp_of(heavy, BOX[2], BOX[1])).outcome is Outcome.SLIPPED
 
 
 def test_the_configured_force_decides_what_slips() -> None:
     # 1.8 kg at a friction of 0.3 need 29.4 N of each pad, and more when shaken
     scene = scene_with(block(*BOX, mass=1.8, friction=0.3))
     grasp = grasp_of(scene, BOX[2], BOX[1])
-    assert attempt(scene, grasp, grip_force=30.0).outcome == "slipped"
-    assert attempt(scene, grasp, grip_force=60.0).outcome == "success"
+    assert attempt(scene, grasp, grip_force=30.0).outcome is Outcome.SLIPPED
+    assert attempt(scene, grasp, grip_force=60.0).outcome is Outcome.SUCCESS
 
 
 def test_the_result_does_not_depend_on_what_was_tried_before() -> None:
@@ -148,7 +150,7 @@ def test_the_arm_ends_the_same_grasp_alike(
     expected = execute_grasp(ArmDriver(simulation), grasp)
     result = attempt(box, grasp)
     assert (result.outcome, result.lifted) == (expected.outcome, expected.lifted), expected.reason
-    assert result.outcome in OUTCOMES
+    assert result.outcome in get_args(LiftOutcome)
 
 
 @pytest.mark.parametrize("field", ["position", "angle", "width"])

@@ -9,8 +9,8 @@ import pytest
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import rotation_z, transform
-from mpgrasp.motion.ik import IkSolution
-from mpgrasp.motion.reflex import UNITS, Reflex, ReflexConfig, ReflexMonitor
+from mpgrasp.motion.ik_solution import IkSolution
+from mpgrasp.motion.reflex import UNITS, MeasuredArm, Reflex, ReflexConfig, ReflexMonitor
 from mpgrasp.robot import panda
 
 
@@ -28,12 +28,12 @@ def solution(**changes: Any) -> IkSolution:
 
 
 def check(monitor: ReflexMonitor, **changes: Any) -> Reflex | None:
-    values: dict[str, Any] = {
-        "time": 1.0, "dt": 0.01, "solution": solution(), "q": np.array(panda.Q_HOME), "dq": np.zeros(7),
-        "twist": np.zeros(6), "T_world_tcp": np.eye(4), "T_world_tcp_desired": np.eye(4),
-        "contact_force": 0.0,
+    measured: dict[str, Any] = {
+        "time": 1.0, "q": np.array(panda.Q_HOME), "dq": np.zeros(7), "twist": np.zeros(6),
+        "T_world_tcp": np.eye(4), "contact_force": 0.0,
     }  # fmt: skip
-    return monitor.check(**(values | changes))
+    wanted = changes.pop("solution", None) or solution()
+    return monitor.check(MeasuredArm(**(measured | changes)), wanted, np.eye(4), 0.01)
 
 
 def test_rest_trips_nothing() -> None:

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from mpgrasp.scene.config import SceneConfig
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
@@ -15,10 +14,11 @@ from mpgrasp.motion.ik import DifferentialIK, solve_pose
 from mpgrasp.motion.time_scaling import rehearse, slowdown
 from mpgrasp.motion.trajectory import MotionConfig, path_profile, pose_error
 from mpgrasp.robot.panda import DDQ_MAX, DQ_MAX, Q_HOME
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
 
-UNPACED = MotionConfig(max_slowdown=1.0)
+UNSCALED = MotionConfig(max_slowdown=1.0)
 NEAR_BASE = ((0.333, 0.093, 0.170), (0.363, 0.090, 0.060), -1.417)
 """Start, end [m] and yaw [rad] of a move during which the smallest singular value falls to 0.07."""
 
@@ -41,7 +41,7 @@ def move(
 def test_a_move_past_a_singularity_keeps_every_joint_within_its_limits() -> None:
     start, end, yaw = NEAR_BASE
     # at full speed the same way ends in a stop
-    assert move(start, end, yaw, 0.0, UNPACED).reflex is not None
+    assert move(start, end, yaw, 0.0, UNSCALED).reflex is not None
     driver = move(start, end, yaw, 0.0, MotionConfig())
     statistics = driver.statistics()
     assert driver.reflex is None
@@ -103,7 +103,7 @@ def test_slowing_down_is_bounded_and_needs_a_way_to_go() -> None:
     assert slowdown(ik, q, start, far, path_profile(0.6, 0.0, c, 0.25, 1.5), c) == 2.5
 
 
-def test_unusable_pacing_is_refused() -> None:
+def test_unusable_time_scaling_is_refused() -> None:
     for bad in ({"joint_fraction": 0.0}, {"joint_fraction": 1.1}, {"max_slowdown": 0.9}):
         with pytest.raises(ConfigError):
             MotionConfig(**bad)  # type: ignore[arg-type]

@@ -70,7 +70,6 @@ def test_limits_equal_the_published_ones(robot: mujoco.MjModel) -> None:
         )
     assert panda.Q_MIN.tolist() == q_min
     assert panda.Q_MAX.tolist() == q_max
-    assert panda.TORQUE_MAX.tolist() == torque
     assert panda.DQ_MAX.tolist() == [2.175] * 4 + [2.61] * 3
     assert panda.DDQ_MAX.tolist() == [15, 7.5, 10, 12.5, 15, 20, 20]
 

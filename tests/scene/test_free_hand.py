@@ -12,7 +12,7 @@ from mpgrasp.motion.ik import solve_pose
 from mpgrasp.robot import hand as franka_hand
 from mpgrasp.robot import panda
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.free_hand import DAMPING, INERTIA, STIFFNESS, FreeGripper
+from mpgrasp.scene.free_hand import DAMPING, INERTIA, STIFFNESS, FreeHand
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.simulation import Simulation
 from mpgrasp.workspace import WORKSPACE_CENTRE
@@ -37,8 +37,8 @@ def arm() -> Simulation:
 
 
 @pytest.fixture
-def hand(scene: Scene) -> FreeGripper:
-    return FreeGripper(scene)
+def hand(scene: Scene) -> FreeHand:
+    return FreeHand(scene)
 
 
 def geoms_in_tool_frame(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, np.ndarray]:
@@ -54,7 +54,7 @@ def geoms_in_tool_frame(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str,
     return found
 
 
-def test_every_part_of_the_hand_is_where_the_arm_carries_it(hand: FreeGripper, arm: Simulation) -> None:
+def test_every_part_of_the_hand_is_where_the_arm_carries_it(hand: FreeHand, arm: Simulation) -> None:
     hand.place([0.4, 0.1, 0.2], 0.7, franka_hand.GRIPPER_MAX_WIDTH)
     mine, its = geoms_in_tool_frame(hand.model, hand.data), geoms_in_tool_frame(arm.model, arm.data)
     assert set(mine) == set(its) == {panda.PREFIX + name for name in HAND_GEOMS}
@@ -80,7 +80,7 @@ def test_the_hand_yields_and_weighs_as_the_arm_does_over_the_middle_of_the_works
         assert np.array(mine) == pytest.approx(1 / np.diag(J @ np.linalg.inv(its) @ J.T), rel=0.05)
 
 
-def test_placed_the_tool_point_looks_down_at_that_heading(hand: FreeGripper) -> None:
+def test_placed_the_tool_point_looks_down_at_that_heading(hand: FreeHand) -> None:
     hand.place([0.45, -0.1, 0.25], -1.2, 0.03)
     mujoco.mj_forward(hand.model, hand.data)
     site = hand.data.site(panda.PREFIX + "tcp")
@@ -91,7 +91,7 @@ def test_placed_the_tool_point_looks_down_at_that_heading(hand: FreeGripper) -> 
     assert hand.gripper_width == pytest.approx(0.03)
 
 
-def test_at_constant_speed_the_hand_does_not_lag(hand: FreeGripper) -> None:
+def test_at_constant_speed_the_hand_does_not_lag(hand: FreeHand) -> None:
     hand.place([0.5, 0.0, 0.3], 0.4, 0.05)
     target = np.array([0.5, 0.0, 0.3])
     for _ in range(60):
@@ -103,7 +103,7 @@ def test_at_constant_speed_the_hand_does_not_lag(hand: FreeGripper) -> None:
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_steady_force_bends_the_servo_by_its_stiffness(hand: FreeGripper, axis: int) -> None:
+def test_a_steady_force_bends_the_servo_by_its_stiffness(hand: FreeHand, axis: int) -> None:
     hand.place([0.5, 0.0, 0.3], 0.0, 0.05)
     # through the tool point, so that it does not turn the hand
     tcp, body = np.array([0.5, 0.0, 0.3]), hand.model.body(panda.PREFIX + "hand").id
@@ -116,7 +116,7 @@ def test_a_steady_force_bends_the_servo_by_its_stiffness(hand: FreeGripper, axis
     assert hand.T_world_tcp[axis, 3] - tcp[axis] == pytest.approx(20.0 / STIFFNESS[axis], rel=0.02)
 
 
-def test_pressing_on_the_table_is_felt_as_an_upward_force(hand: FreeGripper) -> None:
+def test_pressing_on_the_table_is_felt_as_an_upward_force(hand: FreeHand) -> None:
     spot = np.array([0.75, 0.4, franka_hand.FINGERTIP_BEYOND_TCP])  # beside the objects
     up = np.array([0.0, 0.0, 1.0])
     hand.place(spot + 0.01 * up, 0.0, 0.0)
@@ -127,7 +127,7 @@ def test_pressing_on_the_table_is_felt_as_an_upward_force(hand: FreeGripper) -> 
     assert np.abs(hand.external_force[:2]).max() < 1.0
 
 
-def test_only_overlap_with_something_is_a_touch(hand: FreeGripper) -> None:
+def test_only_overlap_with_something_is_a_touch(hand: FreeHand) -> None:
     x, y, z = hand.object_pose("usb_stick")[:3, 3]
     hand.place([x, y, z + 0.05], 0.0, 0.0)
     assert not hand.touches()
@@ -136,7 +136,7 @@ def test_only_overlap_with_something_is_a_touch(hand: FreeGripper) -> None:
     assert hand.touches()
 
 
-def test_what_is_not_touched_stays_exactly_where_it_settled(hand: FreeGripper, scene: Scene) -> None:
+def test_what_is_not_touched_stays_exactly_where_it_settled(hand: FreeHand, scene: Scene) -> None:
     before = {name: scene.data().body(name).xpos.copy() for name in scene.objects}
     hand.place([0.5, 0.0, 0.4], 0.0, 0.08)
     for _ in range(50):
@@ -146,18 +146,16 @@ def test_what_is_not_touched_stays_exactly_where_it_settled(hand: FreeGripper, s
     assert hand.are_still(scene.objects)
 
 
-def test_the_highest_point_lies_just_above_all_that_the_height_map_sees(
-    hand: FreeGripper, scene: Scene
-) -> None:
+def test_the_highest_point_lies_just_above_all_that_the_height_map_sees(hand: FreeHand, scene: Scene) -> None:
     seen = scene.height_map().height.max()
     assert seen - 1e-6 <= hand.top < seen + 0.01
 
 
 def test_a_scene_with_an_arm_has_no_room_for_a_second_hand() -> None:
     with pytest.raises(ConfigError, match="robot=False"):
-        FreeGripper(build_scene(CONFIG, 3))
+        FreeHand(build_scene(CONFIG, 3))
 
 
-def test_an_object_that_is_not_there_has_no_pose(hand: FreeGripper) -> None:
+def test_an_object_that_is_not_there_has_no_pose(hand: FreeHand) -> None:
     with pytest.raises(ConfigError, match="usb_stick"):
         hand.object_pose("teapot")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,7 +17,8 @@ from mpgrasp.scene.cloth import HALF_EXTENT, make_cloth
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.export import save_scene
 from mpgrasp.scene.objects.catalogue import OBJECT_SETS
-from mpgrasp.scene.objects.model import ObjectModel, Part, add_object
+from mpgrasp.scene.objects.free_body import add_object
+from mpgrasp.scene.objects.model import ObjectModel, Part
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.scene.settling import REGION_TOLERANCE
 from mpgrasp.workspace import WORKSPACE_CENTRE
@@ -245,7 +247,7 @@ def test_build_refuses_what_it_cannot_place() -> None:
         {"centre": (0.5, float("inf"))},
     ],
 )
-def test_unusable_settings_are_refused(settings: dict) -> None:
+def test_unusable_settings_are_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         SceneConfig(**settings)
 

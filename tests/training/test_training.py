@@ -26,6 +26,7 @@ from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 from mpgrasp.geometry import line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.lift_trial import LiftResult
+from mpgrasp.outcome import Outcome
 from mpgrasp.training import lifts
 from mpgrasp.training import trainer as trainer_module
 from mpgrasp.training.__main__ import main
@@ -540,7 +541,7 @@ def test_the_best_grasp_is_executed_where_the_camera_saw_it(
 
         def attempt(self, grasp: Grasp) -> LiftResult:
             tried.append(grasp)
-            return LiftResult(outcome="success" if len(tried) == 1 else "missed", reason="")
+            return LiftResult(outcome=Outcome.SUCCESS if len(tried) == 1 else Outcome.MISSED, reason="")
 
     made: list[tuple[int, int]] = []
     monkeypatch.setattr(lifts, "make_scene", lambda seed, index: ((seed, index), None))

@@ -24,7 +24,7 @@ def world_card(suite: Suite, config: EpisodeConfig, seed: int) -> dict[str, Any]
     """
     from mpgrasp.camera.noise import DepthNoise
     from mpgrasp.camera.wrist_camera import WristCamera
-    from mpgrasp.motion.ik import IkConfig
+    from mpgrasp.motion.ik_config import IkConfig
     from mpgrasp.motion.reflex import ReflexConfig
     from mpgrasp.motion.trajectory import MotionConfig
     from mpgrasp.scene.scene import build_scene

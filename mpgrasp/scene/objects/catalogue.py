@@ -1,4 +1,4 @@
-"""The catalogue of evaluation objects, and objects made from a mesh file.
+"""The catalogue of evaluation objects, read from its declarations and meshes.
 
 `assets/objects/generate.py` writes the catalogue: `objects.toml` and the meshes beside it. A mesh file
 holds one convex piece per `o` group; simple pieces are primitives in the declaration itself.

@@ -34,16 +34,18 @@ from mpgrasp.scene.objects.surface import (
 )
 
 DENSITY = 500.0
-"""Of an object of which nothing else is known [kg/m^3]: light wood, or a half-full package."""
+"""Density of an object of which nothing else is known [kg/m^3]: light wood, or a half-full package."""
 FRICTION = 0.6
 """Sliding friction coefficient of such an object."""
 TOLERANCE = 0.004
-"""How far the convex pieces may depart from the mesh [m]."""
+"""Distance by which the convex pieces may depart from the mesh [m]."""
 MAX_PIECES = 16
 MAX_FACES = 2500
 """A mesh with more is simplified before it is cut: CoACD's time grows with them."""
 MAX_VERTICES = 200
 """A convex piece with more keeps those that are extreme in as many directions."""
+CONVEX_ENOUGH = 0.97
+"""A piece that fills this share of its convex hull is taken to be its hull."""
 
 _COACD = {"max_convex_hull": MAX_PIECES, "resolution": 1000, "mcts_nodes": 12, "mcts_iterations": 40,
           "mcts_max_depth": 2, "preprocess_mode": "off", "seed": 0}  # fmt: skip
@@ -59,7 +61,7 @@ class MeshBody:
     pieces: tuple[FloatArray, ...]
     """Vertices (n, 3) [m] of each."""
     volume: float
-    """Of the mesh itself [m^3]: the pieces overlap a little and fill hollows up to the tolerance."""
+    """Volume of the mesh itself [m^3]: the pieces overlap a little and fill hollows up to the tolerance."""
     key: str
     """Hash of the file's content and of all that decides what is made of it."""
 
@@ -193,7 +195,7 @@ def _thinned(vertices: FloatArray) -> FloatArray:
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        corners = vertices[np.sort(ConvexHull(vertices).vertices)]
+        corners = np.asarray(vertices[np.sort(ConvexHull(vertices).vertices)])
     except QhullError:
         raise AssetError("mesh has a flat piece", got=f"{len(vertices)} vertices in one plane") from None
     if len(corners) <= MAX_VERTICES:
@@ -202,35 +204,4 @@ def _thinned(vertices: FloatArray) -> FloatArray:
     z, turn = 1 - (2 * k + 1) / MAX_VERTICES, k * np.pi * (3 - np.sqrt(5))  # a Fibonacci spiral
     around = np.sqrt(1 - z**2)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
     directions = np.vstack([np.eye(3), -np.eye(3), np.column_stack([around, z])])
-    return corners[np.unique(np.argmax(corners @ directions.T, axis=0))]
-
-
-CONVEX_ENOUGH = 0.97
-"""A piece that fills this share of its convex hull is taken to be its hull."""
-
-
-def convex_pieces(mesh: Any, threshold: float = 0.08) -> list[FloatArray]:
-    """Vertices (n, 3) [m] of the convex pieces of a connected `trimesh.Trimesh`, by CoACD where needed.
-
-    `threshold` is CoACD's concavity. A surface with holes counts as its hull: it has no inside to cut.
-    """
-    hull = mesh.convex_hull
-    if not mesh.is_volume or mesh.volume >= CONVEX_ENOUGH * hull.volume:
-        return [np.asarray(hull.vertices)]
-    try:
-        import coacd
-    except ImportError:
-        raise AssetError(
-            "mesh is not convex",
-            got=f"{mesh.volume / hull.volume:.0%} of its hull",
-            allowed="pip install mpgrasp[assets]",
-        ) from None
-    coacd.set_log_level("error")
-    cut = coacd.run_coacd(
-        coacd.Mesh(mesh.vertices, mesh.faces),
-        threshold=threshold,
-        max_convex_hull=16,
-        resolution=1000,
-        seed=0,
-    )
-    return [np.asarray(vertices) for vertices, _ in cut]
+    return np.asarray(corners[np.unique(np.argmax(corners @ directions.T, axis=0))])

@@ -1,7 +1,7 @@
-"""A rigid object as a union of convex parts, and how it enters a MuJoCo model.
+"""A rigid object as a union of convex parts: shape, mass, friction and colour.
 
-What a camera sees and what a finger touches are the same parts, so that the true shape, the depth
-image and the contacts can never disagree.
+A camera sees the same parts that a finger touches, so that the true shape, the depth image and the
+contacts can never disagree. `free_body` puts an object into a MuJoCo model.
 """
 
 from __future__ import annotations
@@ -9,36 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from mpgrasp.exceptions import AssetError
-from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.geometry import FloatArray, rotation_from_quaternion, transform
 
 OBJECT_GROUP = 1
 """Geom group of all objects: height maps cast their rays at this group alone."""
 MAX_SIZE = 0.3
 """Largest edge of an object's bounding box [m]; anything above was most likely saved in millimetres."""
-SOLREF = (0.004, 1.0)
-"""Time constant [s] (the least that 2 ms steps allow) and damping ratio of an object's contacts."""
-SOLIMP = (0.99, 0.999, 0.0005, 0.5, 2.0)
-"""Soft contacts give in proportion to force over mass: 40 N on 10 g would sink 3 mm at the usual 0.95."""
-TORSIONAL_FRICTION = 0.003
-"""Moment of friction about the contact normal per unit of normal force [m]: a soft pad's patch."""
-ROLLING_FRICTION = 0.0008
-"""Moment of friction against rolling per unit of normal force [m]: cloth gives way under a round thing."""
 
-_ROUND = ("cylinder", "capsule", "ellipsoid")
-_GEOM_TYPES = {
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
-    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
-}
 _SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "mesh": 0}
+"""Number of half sizes of each shape."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,8 +40,8 @@ class Part:
     """(n, 3) [m], of a mesh: the part is their convex hull."""
 
     def __post_init__(self) -> None:
-        if self.shape not in _GEOM_TYPES:
-            raise AssetError("unknown shape of a part", got=self.shape, allowed=_GEOM_TYPES)
+        if self.shape not in _SIZES:
+            raise AssetError("unknown shape of a part", got=self.shape, allowed=_SIZES)
         for what, numbers, n in (("position", self.position, 3), ("quaternion", self.quaternion, 4)):
             if np.shape(numbers) != (n,) or not np.isfinite(numbers).all():
                 raise AssetError(f"unusable {what} of a {self.shape}", got=numbers, allowed=f"{n} numbers")
@@ -81,7 +64,7 @@ class Part:
     @property
     def T_object_part(self) -> FloatArray:
         """Pose (4, 4) of the part in the object."""
-        return transform(rotation_of(self.quaternion), self.position)
+        return transform(rotation_from_quaternion(self.quaternion), self.position)
 
     @cached_property
     def points(self) -> FloatArray:
@@ -150,7 +133,7 @@ class ObjectModel:
     rolls: bool = False
     """All parts have friction against rolling; cylinders, capsules and ellipsoids have it anyway."""
     provenance: str = ""
-    """Where shape and mass come from."""
+    """Source of shape and mass."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))
@@ -190,54 +173,3 @@ class ObjectModel:
     def volume(self) -> float:
         """Sum over the parts [m^3]; overlaps count twice."""
         return sum(part.volume for part in self.parts)
-
-
-def rotation_of(quaternion: ArrayLike) -> FloatArray:
-    """Rotation (3, 3) of a wxyz quaternion."""
-    R = np.empty(9)
-    mujoco.mju_quat2Mat(R, np.asarray(quaternion, float))
-    return R.reshape(3, 3)
-
-
-def add_object(
-    spec: mujoco.MjSpec,
-    model: ObjectModel,
-    position: ArrayLike = (0.0, 0.0, 0.0),
-    quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
-    *,
-    name: str | None = None,
-) -> mujoco.MjsBody:
-    """Add the object to a model being built, as a free body called `name` (default: its own name).
-
-    The contacts of its geoms are the object's own (priority 1), whatever it touches.
-    """
-    name = name or model.name
-    body = spec.worldbody.add_body(name=name, pos=position, quat=quaternion)
-    body.add_freejoint(name=f"{name}/free")
-    for k, part in enumerate(model.parts):
-        rolls = model.rolls or part.shape in _ROUND
-        geom = body.add_geom(
-            name=f"{name}/{k}",
-            type=_GEOM_TYPES[part.shape],
-            pos=part.position,
-            quat=part.quaternion,
-            mass=model.mass * part.volume / model.volume,
-            friction=[model.friction, TORSIONAL_FRICTION, ROLLING_FRICTION],
-            condim=6 if rolls else 4,
-            priority=1,
-            solref=list(SOLREF),
-            solimp=list(SOLIMP),
-            group=OBJECT_GROUP,
-            rgba=list(model.rgba),
-        )
-        if part.shape == "mesh":
-            assert part.vertices is not None
-            spec.add_mesh(
-                name=f"{name}/{k}",
-                uservert=part.vertices.ravel(),
-                inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
-            )
-            geom.meshname = f"{name}/{k}"
-        else:
-            geom.size[: len(part.size)] = part.size
-    return body

@@ -77,15 +77,16 @@ def closed_shells(mesh: Any) -> list[Any]:
     """
     import trimesh
 
+    repair: Any = trimesh.repair
     shells, missing, total = [], 0.0, float(mesh.area)
     for shell in mesh.split(only_watertight=False, repair=False):
         if len(shell.faces) < 4 and shell.area < NEGLIGIBLE * total:
             continue  # slivers that decimation leaves behind
         if not shell.is_winding_consistent:
-            trimesh.repair.fix_winding(shell)
+            repair.fix_winding(shell)
         if not shell.is_watertight:
             area = shell.area
-            trimesh.repair.fill_holes(shell, use_fan=True)
+            repair.fill_holes(shell, use_fan=True)
             missing += float(shell.area - area)
         if not shell.is_watertight:
             raise AssetError("mesh is not closed, and cannot be", allowed="a surface without holes")
@@ -143,7 +144,7 @@ def _unpinched(mesh: Any) -> Any:
 
 
 def _around_edges(faces: list[tuple[int, ...]]) -> dict[tuple[int, int], list[tuple[int, bool]]]:
-    """Of every edge (lower vertex, higher vertex) the faces, and whether they run from lower to higher."""
+    """Faces at every edge (lower vertex, higher vertex), each with True if it runs from lower to higher."""
     around: dict[tuple[int, int], list[tuple[int, bool]]] = {}
     for k, (a, b, c) in enumerate(faces):
         for p, q in ((a, b), (b, c), (c, a)):

@@ -10,7 +10,8 @@ import pytest
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.paths import OBJECT_ASSETS, SCENES
 from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object, read_pieces
-from mpgrasp.scene.objects.model import ObjectModel, Part, add_object
+from mpgrasp.scene.objects.free_body import add_object
+from mpgrasp.scene.objects.model import ObjectModel, Part
 
 NAMES = [name for names in OBJECT_SETS.values() for name in names]
 MESHES = sorted(OBJECT_ASSETS.glob("*.obj"))

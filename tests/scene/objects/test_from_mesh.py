@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from toy_meshes import EDGES, box, half_ball, open_box, u_shape, write
 
 from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.commands.run import make_parser
@@ -28,7 +29,6 @@ pytest.importorskip("coacd")
 pytest.importorskip("fast_simplification")
 
 PLUG_INS = ["--detector", "fakes:FakeDetector", "--controller", "fakes:FakeController", "--workers", "0"]
-EDGES = (0.04, 0.05, 0.06)
 
 
 @pytest.fixture(autouse=True)
@@ -37,43 +37,6 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("MPGRASP_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(object_check, "REST_POSES", 2)
     return tmp_path / "cache"
-
-
-def write(mesh: Any, path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    mesh.export(path)
-    return path
-
-
-def box(path: Path, edges: tuple[float, float, float] = EDGES) -> Path:
-    return write(trimesh.creation.box(edges), path)
-
-
-def u_shape() -> Any:
-    """A U of 60 x 40 mm, 20 mm deep, whose slot is 30 mm wide and 25 mm high."""
-    outline = np.array([(0, 0), (60, 0), (60, 40), (45, 40), (45, 15), (15, 15), (15, 40), (0, 40)]) / 1000
-    quads = [(0, 5, 6, 7), (0, 1, 4, 5), (1, 2, 3, 4)]
-    n = len(outline)
-    vertices = np.vstack([np.column_stack([outline, np.full(n, z)]) for z in (0.0, 0.02)])
-    faces = []
-    for a, b, c, d in quads:
-        faces += [(c, b, a), (d, c, a), (n + a, n + b, n + c), (n + a, n + c, n + d)]
-    for k in range(n):
-        j = (k + 1) % n
-        faces += [(k, j, n + j), (k, n + j, n + k)]
-    return trimesh.Trimesh(vertices, faces)
-
-
-def open_box() -> Any:
-    mesh = trimesh.creation.box(EDGES)
-    mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
-    return mesh
-
-
-def half_ball() -> Any:
-    mesh = trimesh.creation.icosphere(radius=0.03)
-    mesh.update_faces(mesh.triangles_center[:, 2] > 0)
-    return mesh
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".stl", ".ply", ".STL"])

@@ -1,0 +1,80 @@
+"""A scene in motion with the robot's hand in it, whatever carries the hand: the arm, or nothing at all."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import mujoco
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.robot import hand
+from mpgrasp.robot.contacts import PadContacts
+from mpgrasp.robot.gripper import GripperDrive
+from mpgrasp.scene.scene import Scene
+
+
+class MovingScene(ABC):
+    """One scene in motion: its time, its objects, and the gripper among them.
+
+    Args:
+        scene: with the hand in it under the prefix `panda/`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.model: mujoco.MjModel = scene.model
+        self.data = mujoco.MjData(self.model)
+        self._gripper = GripperDrive(self.model, self.data)
+        self._pad_contacts = PadContacts(self.model, self.data, scene.objects)
+        self._stale = False  # True while poses and contacts lag behind the joint positions
+
+    @property
+    @abstractmethod
+    def T_world_tcp(self) -> FloatArray:
+        """Pose (4, 4) of the tool point."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.data.time)
+
+    @property
+    def gripper_width(self) -> float:
+        """Opening between the pads [m]."""
+        return self._gripper.width
+
+    def open_gripper(self, width: float = hand.GRIPPER_MAX_WIDTH) -> None:
+        """Move to an opening [m], wider or narrower, at `hand.GRIPPER_SPEED`; cut at the hand's limits."""
+        self._gripper.open(width)
+
+    def close_gripper(self, force: float = hand.GRIPPER_FORCE_DEFAULT) -> None:
+        """Close at `hand.GRIPPER_CLOSE_SPEED` until both pads press with `force` [N], whatever the width.
+
+        Raises:
+            ConfigError: a force that the hand cannot hold continuously.
+        """
+        self._gripper.close(force)
+
+    def pad_contacts(self) -> tuple[set[str], set[str]]:
+        """Names of the objects that press against the face of the left and of the right pad."""
+        self.refresh()
+        return self._pad_contacts.objects()
+
+    def object_pose(self, name: str) -> FloatArray:
+        """Pose (4, 4) of an object's body frame in the world.
+
+        Raises:
+            ConfigError: the scene has no such object.
+        """
+        if name not in self.scene.objects:
+            raise ConfigError("unknown object", got=name, allowed=self.scene.objects)
+        self.refresh()
+        body = self.data.body(name)
+        return transform(body.xmat.reshape(3, 3), body.xpos)
+
+    def refresh(self) -> None:
+        """Bring poses and contacts up to the joint positions, where they lag behind."""
+        if self._stale:
+            mujoco.mj_forward(self.model, self.data)
+            self._stale = False

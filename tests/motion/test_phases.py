@@ -1,0 +1,114 @@
+"""Phases of an execution are played in order, up to a protective stop, and any may be replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.grasp import Grasp
+from mpgrasp.motion.execution_config import ExecutionConfig
+from mpgrasp.motion.execution_state import ExecutionState, Phase
+from mpgrasp.motion.phases import PHASES, descend, pregrasp
+from mpgrasp.robot.hand import FINGERTIP_BEYOND_TCP
+
+GRASP = Grasp(position=np.array([0.5, 0.1, 0.06]), angle=0.0, width=0.03, quality=1.0)
+
+
+class PlainDriver:
+    """Arrives at once wherever it is sent; feels the ground when its tips would be below `ground` [m]."""
+
+    def __init__(self, z: float = 0.4, ground: float = -1.0) -> None:
+        self.T_desired, self.ground = looking_down([0.5, 0.1, z]), ground
+        self.reflex: Any = None
+        self.touch = 0.0
+        self.moves: list[tuple[float, float]] = []
+        self.widths: list[float] = []
+        self.simulation: Any = SimpleNamespace(
+            time=0.0,
+            scene=SimpleNamespace(objects=()),
+            open_gripper=self.widths.append,
+        )
+
+    def move_to(
+        self,
+        T_world_tcp: FloatArray,
+        max_speed: float,
+        *,
+        until: Callable[[], bool] | None = None,
+        deceleration: float | None = None,
+        on_tick: Callable[[Any], None] | None = None,
+    ) -> bool:
+        target, lowest = T_world_tcp.copy(), self.ground + FINGERTIP_BEYOND_TCP
+        self.touch = 10.0 if target[2, 3] < lowest else 0.0
+        target[2, 3] = max(target[2, 3], lowest)
+        self.T_desired = self.simulation.T_world_tcp = target
+        self.moves.append((float(target[2, 3]), max_speed))
+        if on_tick is not None:
+            on_tick(self)
+        return until is None or not until()
+
+    def wait(self, *_: Any, **__: Any) -> None: ...
+    def follow(self, *_: Any, **__: Any) -> None: ...
+
+
+def state_by(driver: PlainDriver, **changes: Any) -> ExecutionState:
+    return ExecutionState(driver, GRASP, ExecutionConfig(), yaw=0.0, **changes)
+
+
+def test_phases_are_played_in_order_and_each_tick_is_told_its_own() -> None:
+    told: list[str] = []
+
+    def two_moves(state: ExecutionState) -> None:
+        state.rise(0.01, 0.1)
+        state.rise(0.01, 0.1)
+
+    state_by(PlainDriver(), on_tick=told.append).play({"first": two_moves, "then": two_moves})
+    assert told == ["first", "first", "then", "then"]
+
+
+def test_nothing_is_played_after_a_protective_stop() -> None:
+    driver, played = PlainDriver(), []
+
+    def stopped(state: ExecutionState) -> None:
+        played.append(state.phase)
+        driver.reflex = "contact_force"
+
+    phases: dict[str, Phase] = {**PHASES, "descend": stopped}
+    state = state_by(driver)
+    state.play(phases)
+    assert (played, state.phase) == (["descend"], "descend")
+
+
+def test_the_tool_comes_down_onto_the_pregrasp_from_wherever_it_is() -> None:
+    c = ExecutionConfig()
+    for start, ways in ((0.4, 1), (0.05, 2)):  # from below it rises first
+        driver = PlainDriver(z=start)
+        pregrasp(state_by(driver))
+        assert len(driver.moves) == ways
+        assert driver.widths == [pytest.approx(0.03 + c.opening_margin)]
+        assert all(z == pytest.approx(0.06 + c.approach) for z, _ in driver.moves)
+
+
+def test_the_descent_slows_down_and_ends_as_deep_as_the_palm_allows() -> None:
+    driver, c = PlainDriver(), ExecutionConfig()
+    state = state_by(driver)
+    descend(state)
+    heights = [z - FINGERTIP_BEYOND_TCP for z, _ in driver.moves]
+    assert heights == pytest.approx([0.06 + c.entry_height, 0.06 - c.palm_depth])
+    assert [speed for _, speed in driver.moves] == [c.descent_speed, c.entry_speed]
+    assert state.contact_height is None
+    assert state.tip_height == pytest.approx(0.06 - c.palm_depth)
+
+
+def test_a_descent_that_feels_something_backs_off_a_little() -> None:
+    driver, c = PlainDriver(ground=0.03), ExecutionConfig()
+    state = state_by(driver)
+    descend(state)
+    assert state.contact_height == pytest.approx(0.03)
+    assert state.tip_height == pytest.approx(0.03 + c.back_off)
+    assert len(driver.moves) == 3
