@@ -29,8 +29,19 @@ from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, invert, looking_down, transform_points, wrap_half_pi
 
-JAW = 0.02
-"""Width of the Panda's finger pads across the closing direction [m]."""
+RECTANGLE_JAW = 0.02
+"""Nominal width of the jaws in grasp rectangles, across the closing direction [m].
+
+A convention of annotation: rectangles are compared by their overlap, so all of them must have the same jaws.
+It is not the width of the hand's pads, which is `robot.hand.FINGER_WIDTH`: with that one every overlap would
+be another number.
+"""
+PEAK_QUALITY = 0.34
+"""A quality map has a peak, exist_peak() of Algorithm 1, where its `peak_height` exceeds this.
+
+Chosen by Youden's J over the shipped detectors' grasps in held-out scenes (benchmarks/held_out.py,
+"together": 0.32 to 0.44); it lies within each detector's own interval.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,14 +106,14 @@ class GraspMap:
         return self.width * self.depth / self.intrinsics.fx
 
     def grasp_of(self, rectangle: GraspRectangle) -> Grasp:
-        """The grasp in the world that a rectangle of this image stands for, at the nearest pixel's depth."""
+        """Return the grasp that a rectangle of this image stands for, at the nearest pixel's depth."""
         rows, cols = self.depth.shape
         row = int(np.clip(np.rint(rectangle.v), 0, rows - 1))
         col = int(np.clip(np.rint(rectangle.u), 0, cols - 1))
         return self._grasp(rectangle, row, col)
 
-    def rectangle_of(self, grasp: Grasp, jaw: float = JAW) -> GraspRectangle:
-        """The rectangle that a grasp in the world, with fingers `jaw` wide [m], covers in this image."""
+    def rectangle_of(self, grasp: Grasp, jaw: float = RECTANGLE_JAW) -> GraspRectangle:
+        """Return the rectangle that a grasp, with fingers `jaw` wide [m], covers in this image."""
         camera = transform_points(invert(self.T_world_camera), np.asarray(grasp.position, float))
         u, v = self.intrinsics.project(camera)
         px_per_metre = self.intrinsics.fx / float(camera[2])
@@ -115,7 +126,7 @@ class GraspMap:
         )
 
     def grasp_at(self, row: int, col: int) -> Grasp:
-        """The grasp of one pixel in the world (eq. 3)."""
+        """Return the grasp of one pixel in the world (eq. 3)."""
         rectangle = GraspRectangle(
             u=float(col),
             v=float(row),
@@ -142,7 +153,8 @@ def image_to_world_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatA
     # (du, dv) = (cos, -sin) is the camera-frame direction (cos, -sin, 0)
     c, s = np.cos(angle), np.sin(angle)
     R = T_world_camera[:3, :3]
-    return np.arctan2(c * R[1, 0] - s * R[1, 1], c * R[0, 0] - s * R[0, 1])
+    heading: FloatArray = np.arctan2(c * R[1, 0] - s * R[1, 1], c * R[0, 0] - s * R[0, 1])
+    return heading
 
 
 def world_to_image_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
@@ -191,7 +203,8 @@ class GraspRectangle:
         along = np.array([np.cos(self.angle), -np.sin(self.angle)]) * self.width_px / 2
         across = np.array([np.sin(self.angle), np.cos(self.angle)]) * self.jaw_px / 2
         corners = np.array([-along - across, along - across, along + across, -along + across])
-        return corners + np.array([self.u, self.v])
+        result: FloatArray = corners + np.array([self.u, self.v])
+        return result
 
     def iou(self, other: GraspRectangle) -> float:
         """Area shared with `other` over the area of both together, in [0, 1]."""
@@ -245,7 +258,7 @@ def peaks(
 
 
 def peak_height(quality: FloatArray) -> float:
-    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
+    """Return the highest 3x3 mean of a quality map (H, W), for exist_peak() to compare with a threshold."""
     finite = quality if np.isfinite(quality).all() else np.nan_to_num(quality)
     image = finite.astype(np.float32, copy=False)
     return float(cv2.blur(image, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

@@ -203,7 +203,8 @@ def test_importing_the_environment_loads_no_torch() -> None:
 @pytest.mark.parametrize(
     "words",
     [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "report", "--help"),
-     ("detectors", "--help")],
+     ("detectors", "--help"), ("training", "--help"), ("training", "generate", "--help"),
+     ("training", "train", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
     module = f"mpgrasp.{words[0]}"

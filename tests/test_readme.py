@@ -23,7 +23,8 @@ from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
 from mpgrasp.bench.playing.programme import PROGRAMMES
 from mpgrasp.camera.wrist_camera import D435_INTRINSICS
 from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors.networks.registry import NETWORKS, RUNTIMES
+from mpgrasp.detectors.networks.registry import NETWORKS
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.json_values import plain
 from mpgrasp.geometry import looking_down

@@ -123,13 +123,6 @@ class GridMap:
         u = self.config.cell
         return np.array([self.x0 + (cell[1] + 0.5) * u, self.y0 + (cell[0] + 0.5) * u])
 
-    def cell_at(self, x: float, y: float) -> tuple[int, int] | None:
-        """(row, col) of a world position [m], or None outside of the grid."""
-        ny, nx = self.shape
-        row = int(np.floor((y - self.y0) / self.config.cell))
-        col = int(np.floor((x - self.x0) / self.config.cell))
-        return (row, col) if 0 <= row < ny and 0 <= col < nx else None
-
     def update(self, grasp_map: GraspMap) -> NDArray[np.intp]:
         """Add every pixel of a view and return its flat cell index (H, W), -1 where it was dropped.
 

@@ -1,4 +1,4 @@
-"""How uncertain each cell is, what a view from above it would tell, and what that costs (eq. 10-13)."""
+"""Uncertainty of each cell, information gain of a view from above it, and cost of that view (eq. 10-13)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.geometry import FloatArray
 
 Border = Literal["nothing", "mirror"]
-"""What lies beyond the grid: "nothing" to be learnt (eq. 11 sums over cells), or the grid's mirror image,
+"""Entropy beyond the grid: "nothing" to be learnt (eq. 11 sums over cells), or the grid's mirror image,
 as in published multi-view picking code, which takes away the pull towards the middle of the grid."""
 
 
@@ -29,7 +29,8 @@ def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
     logs = np.log(p, out=np.zeros(p.shape, np.result_type(p, np.float32)), where=True if prior > 0 else p > 0)
     safe = np.where(total > 0, total, 1)
     entropy = np.log(safe) - np.einsum("...q,...q->...", p, logs) / safe
-    return np.where(total > 0, np.maximum(entropy, 0.0), np.log(p.shape[-1]))
+    result: FloatArray = np.where(total > 0, np.maximum(entropy, 0.0), np.log(p.shape[-1]))
+    return result
 
 
 def grid_entropy(grid: GridMap, prior_count: float = 1.0) -> FloatArray:
@@ -70,7 +71,8 @@ def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: 
         return np.zeros(grid.shape)
     x, y = grid.axes()
     distance = np.hypot(x - centre[0], (y - centre[1])[:, None])  # (ny, nx)
-    return distance * (1.0 - np.clip(height_fraction, 0.0, 1.0))
+    cost: FloatArray = distance * (1.0 - np.clip(height_fraction, 0.0, 1.0))
+    return cost
 
 
 def utility(gain: FloatArray, cost: FloatArray, gamma: float) -> FloatArray:

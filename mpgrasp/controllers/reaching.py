@@ -1,4 +1,4 @@
-"""What MP-PC and its baseline MVP share: fuse a view, find the best viewpoint near by, go there and down."""
+"""Reaching of MP-PC and its baseline MVP: fuse a view, find the best viewpoint near by, go there and down."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TIE = 1e-3
 _TIE_NAT = 1e-6
 """And so are utilities closer than this: single precision makes no better difference [nat]."""
 _YAW_SLACK = np.deg2rad(15)
-"""How far beyond the yaw range a grasp may lie before the hand turns the other way to meet it [rad]."""
+"""Angle beyond the yaw range at which a grasp makes the hand turn the other way to meet it [rad]."""
 
 
 class ReachingController(ABC):
@@ -86,9 +86,9 @@ class ReachingController(ABC):
         """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
         c, k = self.config, grasp_map.intrinsics
         # a sixth of the field of view where it meets the table, in cells; mean of both image sides
-        view = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
+        footprint = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
         entropy = grid_entropy(self.grid, c.prior_count)
-        gain = information_gain(entropy, max(view, 0.0) / 6 / c.grid.cell, c.border)
+        gain = information_gain(entropy, max(footprint, 0.0) / 6 / c.grid.cell, c.border)
         best = self.grid.best_cell()
         centre = None if best is None else self.grid.position(best)
         cost = exploration_cost(self.grid, centre, (height - c.z_min) / (c.z_max - c.z_min))

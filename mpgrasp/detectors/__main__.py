@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from mpgrasp.command_line import Parser
-from mpgrasp.detectors.networks.registry import RUNTIMES
+from mpgrasp.detectors.runtimes import RUNTIMES
 
 _RUNTIMES = "|".join(RUNTIMES)
 _EPILOG = """\

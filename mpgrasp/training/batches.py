@@ -1,4 +1,4 @@
-"""Which images each training step sees, and their batches, prepared while the step before computes."""
+"""Batches of each training step, prepared while the step before computes."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ class GraspDataset:
 
     @property
     def scene_count(self) -> int:
-        """How many scenes the training images show."""
+        """Number of scenes that the training images show."""
         return len(np.unique(self._scenes()[self.training]))
 
     def description(self) -> list[dict[str, object]]:
@@ -141,7 +141,7 @@ class GraspDataset:
         return about
 
     def _lifts(self, directory: Path) -> dict[str, object]:
-        """Of the simulated lifts behind the labels: (lifted, tried) by where the grasps were drawn from."""
+        """Return counts (lifted, tried) of the simulated lifts behind the labels, by source of the grasps."""
         names = self._told[directory].get("trial_columns")
         read = zip(self._paths, self._shards, strict=True)
         trials = [s["trials"] for path, s in read if path.parent == directory and "trials" in s]

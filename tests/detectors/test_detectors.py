@@ -16,11 +16,12 @@ from height_maps import Solid, height_map
 from safetensors.torch import save_file
 
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
-from mpgrasp.detectors import DETECTORS, GraspDetector, make_detector
-from mpgrasp.detectors.detector import prepare, reads_colour
+from mpgrasp.detectors import DETECTORS, make_detector
+from mpgrasp.detectors.detector import GraspDetector, prepare, reads_colour
 from mpgrasp.detectors.network_detector import NetworkDetector, NetworkDetectorConfig, postprocess
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.weights import NetworkWeights, build_network, load_weights, save_weights
+from mpgrasp.detectors.networks.registry import build_network
+from mpgrasp.detectors.networks.weights import NetworkWeights, load_weights, save_weights
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.geometry import FloatArray, looking_down, wrap_half_pi
 from mpgrasp.height_map import HeightMap
@@ -351,7 +352,7 @@ def test_a_network_without_shipped_weights_says_how_to_get_some() -> None:
 def test_unknown_names_and_settings_are_one_clear_error(
     files: dict[str, Path | None], tmp_path: Path
 ) -> None:
-    with pytest.raises(ConfigError, match=r"unknown detector.*dhrnet, tfgrasp, ggcnn2, .*oracle"):
+    with pytest.raises(ConfigError, match=r"unknown detector.*dhrnet, tfgrasp, ggcnn, ggcnn2, .*oracle"):
         make_detector("yolo")
     with pytest.raises(ConfigError, match="no weights"):
         make_detector("oracle", files["dhrnet"])

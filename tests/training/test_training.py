@@ -20,12 +20,13 @@ from toy_shards import CAMERA, toy_image, write_shards
 
 from mpgrasp.detectors.network_detector import NetworkDetector, postprocess
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import INPUT_SIZE
-from mpgrasp.detectors.networks.weights import WIDTH_PX, load_weights, read_card
+from mpgrasp.detectors.networks.registry import NETWORKS, declaration
+from mpgrasp.detectors.networks.weights import load_weights, read_card
 from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 from mpgrasp.geometry import line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.lift_trial import LiftResult
+from mpgrasp.outcome import Outcome
 from mpgrasp.training import lifts
 from mpgrasp.training import trainer as trainer_module
 from mpgrasp.training.__main__ import main
@@ -36,11 +37,11 @@ from mpgrasp.training.data.shards import FORMAT
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.lifts import images_to_lift
 from mpgrasp.training.losses import grasp_loss
-from mpgrasp.training.metrics import judge
+from mpgrasp.training.metrics import match_labels
 from mpgrasp.training.progress import ProgressLog
 from mpgrasp.training.train import add_arguments, command_line, config_from
 from mpgrasp.training.trainer import Trainer
-from mpgrasp.training.trainer_config import TRAINABLE, LossConfig, TrainConfig
+from mpgrasp.training.trainer_config import LossConfig, TrainConfig
 
 INPUT = NetworkInput(size=64, centre="median", scale=20.0)
 SMALL = {"width": 8, "stem_width": 8, "head_width": 8, "blocks": 1, "fine_head": False}
@@ -221,17 +222,19 @@ def test_perfect_heads_cost_nothing_and_invalid_pixels_never_count() -> None:
     ("turn", "widen", "hit", "rectangle"),
     [(0.0, 1.0, True, True), (0.4, 1.0, True, True), (0.6, 1.0, False, False), (0.0, 0.7, False, True)],
 )
-def test_verdict_follows_angle_and_opening(turn: float, widen: float, hit: bool, rectangle: bool) -> None:
+def test_the_match_follows_angle_and_opening(turn: float, widen: float, hit: bool, rectangle: bool) -> None:
     truth = toy_sample(4)
-    verdict = judge(truth.quality, truth.angle + np.float32(turn), truth.width * np.float32(widen), truth)
-    assert (verdict.hit, verdict.rectangle) == (hit, rectangle)
+    match = match_labels(
+        truth.quality, truth.angle + np.float32(turn), truth.width * np.float32(widen), truth
+    )
+    assert (match.hit, match.rectangle) == (hit, rectangle)
 
 
 def test_a_grasp_beside_the_object_is_no_hit() -> None:
     truth = toy_sample(4)
     quality = np.zeros_like(truth.quality)
     quality[1, 1] = 1.0
-    assert not judge(quality, truth.angle, truth.width, truth).hit
+    assert not match_labels(quality, truth.angle, truth.width, truth).hit
 
 
 def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path: Path) -> None:
@@ -252,7 +255,7 @@ def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path
     hits = []
     for i in run.dataset.held:
         truth = run.dataset.sample(int(i))
-        hits.append(judge(*detector.grasp_arrays(truth.depth), truth).hit)
+        hits.append(match_labels(*detector.grasp_arrays(truth.depth), truth).hit)
     assert np.mean(hits) == pytest.approx(best["hit"], abs=0.2)  # float32 here, bfloat16 there
 
 
@@ -327,11 +330,11 @@ def test_fewer_images_are_the_first_ones_and_the_held_out_stay(shards: Path) -> 
     assert np.array_equal(few.held, every.held)
 
 
-@pytest.mark.parametrize("name", TRAINABLE)
+@pytest.mark.parametrize("name", NETWORKS)
 def test_biases_and_normalisations_are_not_decayed_and_all_else_is(
     name: str, shards: Path, tmp_path: Path
 ) -> None:
-    size = INPUT_SIZE.get(name, 224)
+    size = declaration(name).input_size
     small = SMALL if name == "dhrnet" else {}
     image = NetworkInput(size=size, scale=20.0)
     run = trainer(shards, tmp_path / "w.safetensors", name=name, settings=small, input=image, batch=1)
@@ -395,9 +398,9 @@ def test_the_global_random_state_is_left_alone(shards: Path, tmp_path: Path) -> 
 def test_doubled_angles_survive_the_wrap() -> None:
     theta = np.where(np.indices((40, 40))[1] < 20, np.pi / 2 - 0.01, -np.pi / 2 + 0.01)
     heads = np.stack([np.ones((40, 40)), np.cos(2 * theta), np.sin(2 * theta), np.ones((40, 40))])
-    _, angle, width = postprocess(heads.astype(np.float32), WIDTH_PX)
+    _, angle, width = postprocess(heads.astype(np.float32), 112.0)
     assert line_angle_difference(angle, np.pi / 2).max() < 0.02
-    assert np.allclose(width, WIDTH_PX, rtol=1e-5)
+    assert np.allclose(width, 112.0, rtol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -540,7 +543,7 @@ def test_the_best_grasp_is_executed_where_the_camera_saw_it(
 
         def attempt(self, grasp: Grasp) -> LiftResult:
             tried.append(grasp)
-            return LiftResult(outcome="success" if len(tried) == 1 else "missed", reason="")
+            return LiftResult(outcome=Outcome.SUCCESS if len(tried) == 1 else Outcome.MISSED, reason="")
 
     made: list[tuple[int, int]] = []
     monkeypatch.setattr(lifts, "make_scene", lambda seed, index: ((seed, index), None))

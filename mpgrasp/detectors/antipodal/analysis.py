@@ -19,11 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.antipodal.turned_view import TurnedView, odd
+from mpgrasp.detectors.antipodal.turned_map import TurnedMap, odd
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.height_map import HeightMap
-
-__all__ = ["HandGeometry", "WorldGrasps", "antipodal_grasps", "quality_along"]
 
 Float32 = NDArray[np.float32]
 
@@ -131,7 +129,7 @@ def _at_angle(
         (int(size[0]), int(size[1])),
         flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
     )
-    view = TurnedView(
+    turned_map = TurnedMap(
         turned[..., 0].astype(np.float32),
         turned[..., 1].astype(np.float32),
         (masses[:, ::-1] - offset) @ R,
@@ -139,8 +137,8 @@ def _at_angle(
         hand,
     )
     result = np.zeros((*turned.shape[:2], 3), np.float32)
-    for level in view.levels():
-        part, window = view.around(level)
+    for level in turned_map.levels():
+        part, window = turned_map.around(level)
         if part is not None:
             part.add_grasps(level, result[window])
     q = np.minimum(result[..., :1], 1)

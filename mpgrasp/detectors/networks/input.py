@@ -23,14 +23,14 @@ CHANNELS = {"d": 1, "rgb": 3, "rgbd": 4}
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkInput:
-    """How images are presented to a network. The defaults are the published GG-CNN's."""
+    """Form in which images are presented to a network. The defaults are the published GG-CNN's."""
 
     size: int = NETWORK_SIZE
     """Side of the input image [px]."""
     modality: str = "d"
     """"d": depth, "rgb": colour, "rgbd": depth, then colour."""
     centre: str = "mean"
-    """What is subtracted from depth: "mean" or "median" of the image."""
+    """Value that is subtracted from depth: "mean" or "median" of the image."""
     clip: float = 1.0
     """Bound on the residual before it is scaled [m]."""
     scale: float = 1.0
@@ -57,12 +57,12 @@ class NetworkInput:
 
     @property
     def reads_depth(self) -> bool:
-        """Whether depth is part of the input."""
+        """True if depth is part of the input."""
         return self.modality != "rgb"
 
     @property
     def reads_colour(self) -> bool:
-        """Whether colour is part of the input."""
+        """True if colour is part of the input."""
         return self.modality != "d"
 
     def __call__(

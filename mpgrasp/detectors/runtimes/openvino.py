@@ -10,6 +10,7 @@ import contextlib
 import copy
 import functools
 import hashlib
+import importlib
 import inspect
 import json
 import logging
@@ -100,7 +101,7 @@ def _openvino() -> ModuleType:
     before = sys.modules.get(name)
     sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed, which OpenVINO allows
     try:
-        import openvino
+        openvino = importlib.import_module("openvino")
     finally:
         if before is None:
             del sys.modules[name]

@@ -1,4 +1,4 @@
-"""What computes a network: torch on a GPU, OpenVINO, or torch on the CPU.
+"""Runtimes, which compute a network: torch on a GPU, OpenVINO, or torch on the CPU.
 
 "auto" takes the fastest that is to be had: CUDA where there is a GPU, else OpenVINO, in bfloat16 where the
 processor has instructions for it, else torch with channels last. All of them give the same bits for the same
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.utils import fusion
 
-from mpgrasp.detectors.networks.registry import RUNTIMES
 from mpgrasp.detectors.networks.weights import NetworkWeights
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
 from mpgrasp.exceptions import ConfigError
 
@@ -34,11 +34,11 @@ class Runtime(Protocol):
     """A network that is ready to be run."""
 
     name: str
-    """What it is in two or three words, such as "openvino bf16"."""
+    """Name in two or three words, such as "openvino bf16"."""
     device: str
     """"cpu" or "cuda"."""
     cached: bool
-    """Whether it was compiled before, and only had to be read."""
+    """True if it was compiled before, and only had to be read."""
 
     def __call__(self, image: Float32) -> Float32:
         """Heads (4, H, W) for an input (channels, H, W): quality, cosine, sine, width."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps
-from mpgrasp.detectors.oracle import view_grasps
+from mpgrasp.detectors.oracle import grasps_in_view
 
 DEPTH_UNIT = 5e-5
 """Step of stored depths [m]."""
@@ -28,7 +28,7 @@ ANGLE_UNIT = np.pi / 256
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ViewLabels:
-    """What a network shall answer to one image, as it is stored."""
+    """Answer that a network shall give to one image, as it is stored."""
 
     quality: NDArray[np.uint8]
     """(H, W) in steps of `QUALITY_UNIT`."""
@@ -42,7 +42,7 @@ class ViewLabels:
 
 def view_labels(grasps: WorldGrasps, image: DepthFrame) -> ViewLabels:
     """Labels of a view, from its true depth at the network's resolution."""
-    view = view_grasps(grasps, image)
+    view = grasps_in_view(grasps, image)
     points = image.world_points()
     row, col, inside = grasps.height_map.cells(points[..., 0], points[..., 1])
     return ViewLabels(

@@ -100,7 +100,7 @@ def training_scene_config(rng: np.random.Generator) -> SceneConfig:
 
 
 def resembles_evaluation_object(size: ArrayLike) -> bool:
-    """Whether all three edges `size` [m], however turned, lie within `LIKENESS` of an evaluation object's."""
+    """True if all three edges `size` [m], however turned, lie within `LIKENESS` of an evaluation object's."""
     ratio = np.sort(np.asarray(size, float)) / _evaluation_sizes()
     return bool((np.abs(ratio - 1) < LIKENESS).all(axis=1).any())
 

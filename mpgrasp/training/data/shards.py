@@ -20,7 +20,7 @@ from mpgrasp.training.data.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMN
 from mpgrasp.training.data.views import META_COLUMNS
 
 FORMAT = 3
-"""Of shards and `meta.json`, and of what a seed means: a scene is a function of the seed, its index and this.
+"""Format of shards and `meta.json`, and of what a seed means: a scene is a function of the seed, its index and this.
 
 When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do
 not show. An object that joins the catalogue or a shipped suite is enough, for training keeps away from it."""
@@ -29,7 +29,7 @@ SHARD_SCENES = 20
 
 
 def describe(config: GenerateConfig) -> dict[str, object]:
-    """What `meta.json` says."""
+    """Return the content of `meta.json`."""
     return {
         "format": FORMAT,
         "seed": config.seed,
@@ -77,7 +77,7 @@ def prepare(config: GenerateConfig, out: Path) -> None:
 
 
 def shard_path(out: Path, first_scene: int) -> Path:
-    """Where the shard lies that begins with that scene."""
+    """Return the path of the shard that begins with that scene."""
     return out / f"shard_{first_scene // SHARD_SCENES:05d}.npz"
 
 

@@ -81,7 +81,7 @@ def _tile(view: dict[str, np.ndarray], trials: np.ndarray) -> np.ndarray:
 
 
 def _rectangle(meta: np.ndarray, told: dict[str, float]) -> GraspRectangle:
-    """Where a trial's grasp lies in a view."""
+    """Return the rectangle of a trial's grasp in a view."""
     T, intrinsics = stored_pose(meta), stored_intrinsics()
     point = transform_points(invert(T), np.array([told["x"], told["y"], told["z"]]))
     u, v = intrinsics.project(point)

@@ -19,6 +19,7 @@ from mpgrasp.geometry import FloatArray, line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.height_map import HeightMap
 from mpgrasp.motion.lift_trial import LiftRig
+from mpgrasp.outcome import Outcome
 from mpgrasp.scene.scene import Scene
 
 TRIAL_COLUMNS = (
@@ -29,7 +30,8 @@ TRIAL_COLUMNS = (
 direction about world z [rad] and opening [m]; analytic quality before verification; 1 for a grasp that the
 analysis has, 0 for one that it excludes; 1 for an audit of the shipped labels; 1 if it lifted; quality as
 shipped; how high the object rises over the cloth [m]; index into `LIFT_OUTCOMES`."""
-LIFT_OUTCOMES = ("success", "collision", "missed", "slipped")
+LIFT_OUTCOMES = (Outcome.SUCCESS, Outcome.COLLISION, Outcome.MISSED, Outcome.SLIPPED)
+"""Outcomes of a lift in the order of their index in shards."""
 POSITIVES = 4
 """Lifts of analytic grasps per scene."""
 NEGATIVES = 1
@@ -45,17 +47,17 @@ SPREAD = 0.0075
 ANGLE_SPREAD = np.deg2rad(20.0)
 """... and in angle [rad]."""
 PRIOR_LIFTS = 0.25
-"""What the analysis counts against a lift at the very same place."""
+"""Weight of the analysis against one lift at the very same place."""
 WIDE_OPEN = 0.070
 """Opening of grasps that the analysis excludes; the execution adds its margin [m]."""
 
-Lift = Callable[[Grasp], str]
+Lift = Callable[[Grasp], Outcome]
 """Tries a grasp in the settled scene; one of `LIFT_OUTCOMES`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Verified:
-    """What is left of the analysis after the lifts, and their record."""
+    """The analysis after the lifts have corrected it, and their record."""
 
     grasps: WorldGrasps
     """With corrected quality."""
@@ -69,12 +71,12 @@ class _Trial:
     col: int
     grasp: Grasp
     positive: bool
-    outcome: str
+    outcome: Outcome
     audit: bool = False
 
     @property
     def lifted(self) -> bool:
-        return self.outcome == LIFT_OUTCOMES[0]
+        return self.outcome == Outcome.SUCCESS
 
 
 def verify(
@@ -92,8 +94,8 @@ def verify(
     if lift is None:
         rig = LiftRig(scene)
 
-        def lift(grasp: Grasp) -> str:
-            return rig.attempt(grasp).outcome
+        def lift(grasp: Grasp) -> Outcome:
+            return Outcome(rig.attempt(grasp).outcome)
 
     truth = grasps.height_map
     trials = []

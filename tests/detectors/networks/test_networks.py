@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 import torch
 
+from mpgrasp.detectors.networks.declaration import HEADS
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import HEADS, INPUT_SIZE, NETWORKS, build_network
+from mpgrasp.detectors.networks.registry import NETWORKS, build_network, declaration
 from mpgrasp.detectors.networks.weights import NetworkWeights, load_weights, save_weights
 from mpgrasp.exceptions import ConfigError
 
@@ -138,7 +139,7 @@ def test_heads_have_their_checkpoint_names(rgbd: Built) -> None:
 
 @pytest.mark.parametrize("name", NETWORKS)
 def test_networks_are_made_for_images_of_their_size(name: str) -> None:
-    size = INPUT_SIZE.get(name, 224)
+    size = declaration(name).input_size
     with torch.device("meta"):
         maps = build_network(name, {}).eval()(torch.zeros(1, 1, size, size))
     assert [tuple(m.shape) for m in maps] == [(1, 1, size, size)] * 4

@@ -10,9 +10,9 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.detectors.networks.weights import (
     NetworkWeights,
-    build_network,
     load_weights,
     read_card,
     save_weights,

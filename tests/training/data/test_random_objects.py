@@ -10,7 +10,13 @@ from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.training.data.hollow_families import HOLLOW_FAMILIES
-from mpgrasp.training.data.random_objects import LIKENESS, _evaluation_sizes, random_object, resembles_evaluation_object, training_scene_config
+from mpgrasp.training.data.random_objects import (
+    LIKENESS,
+    _evaluation_sizes,
+    random_object,
+    resembles_evaluation_object,
+    training_scene_config,
+)
 from mpgrasp.training.data.shapes import Family
 from mpgrasp.training.data.shards import FORMAT
 from mpgrasp.training.data.solid_families import SOLID_FAMILIES

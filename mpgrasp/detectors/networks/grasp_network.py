@@ -1,4 +1,4 @@
-"""What the convolutional grasp networks have in common: their heads, their layers and how they begin."""
+"""Base of the convolutional grasp networks: four heads, first weights, convolutions with batch norm."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.registry import HEADS
+from mpgrasp.detectors.networks.declaration import HEADS
 
 BN_MOMENTUM = 0.1
 """The paper's Section IV-A."""
@@ -34,7 +34,7 @@ class GraspNetwork(nn.Module):
         # one convolution instead of four saves a tenth of a training step
         weight, bias = torch.cat([h.weight for h in heads]), torch.cat([h.bias for h in heads])
         coarse = F.conv2d(features, weight, bias).float()
-        pos, cos, sin, width = resize(coarse, x).split(1, dim=1)  # of (n, 4, H, W)
+        pos, cos, sin, width = torch.split(resize(coarse, x), 1, dim=1)  # of (n, 4, H, W)
         return pos, cos, sin, width
 
 

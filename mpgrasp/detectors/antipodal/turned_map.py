@@ -34,7 +34,7 @@ LANDING = 0.6
 """Worth of a grasp whose tips stop on something other than the support."""
 
 
-class TurnedView:
+class TurnedMap:
     """A height map whose rows run along the closing direction; lengths are in cells unless [m] is said."""
 
     def __init__(
@@ -72,8 +72,8 @@ class TurnedView:
         """Tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
         return [0.0, *np.arange(LEVEL_STEP, self.top - 0.004, LEVEL_STEP)] if self.top > 0.014 else [0.0]
 
-    def around(self, level: float) -> tuple[TurnedView | None, tuple[slice, slice]]:
-        """This view cut down to what matters at a tip height, and where that lies; None = nothing there."""
+    def around(self, level: float) -> tuple[TurnedMap | None, tuple[slice, slice]]:
+        """Return this map cut down to what matters at a tip height, and its place; None = nothing there."""
         occupied = (self.label > 0) & (self.height > level) if level > 0 else self.label > 0
         rows, cols = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))
         if not len(rows):
@@ -195,7 +195,8 @@ class TurnedView:
         after = np.minimum.accumulate(np.where(mask, self.columns, 2 * n)[:, ::-1], axis=1)[:, ::-1]
         left = np.where(a > 0, a - 1 - before[r, np.maximum(a - 1, 0)], n)
         right = np.where(b < n - 1, after[r, np.minimum(b + 1, n - 1)] - b - 1, n)
-        return np.minimum(left, right) * self.cell
+        free: FloatArray = np.minimum(left, right) * self.cell
+        return free
 
     def _edges(self, solid: np.ndarray, on_cloth: bool, r: np.ndarray, c: np.ndarray) -> _Edges:
         """Straight lines through both edges of the runs within the pad's width around cells (r, c)."""
@@ -242,7 +243,7 @@ class TurnedView:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Edges:
-    """What both pads meet, for n candidates; all (n,)."""
+    """Edges that both pads meet, for n candidates; all (n,)."""
 
     length: FloatArray  # of contact across the closing direction [m]
     height: FloatArray  # of the lower of both edges [m]
@@ -254,7 +255,8 @@ class _Edges:
 
 
 def _bell(x: FloatArray) -> FloatArray:
-    return np.exp(-0.5 * x * x)
+    bell: FloatArray = np.exp(-0.5 * x * x)
+    return bell
 
 
 def odd(cells: float) -> int:

@@ -1,0 +1,3 @@
+"""Backends of the camera."""
+
+BACKENDS = ("auto", "gl", "ray")
