@@ -1,3 +1,5 @@
+"""Laws of grasps in the image and in the world."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -15,6 +17,7 @@ from mpgrasp.grasp import (
     peaks,
     world_to_image_angle,
 )
+from mpgrasp.robot.hand import FINGER_WIDTH
 
 YAWS = [0.0, 0.7, -2.1]
 WIDE = CameraIntrinsics(fx=210.0, fy=230.0, cx=70.0, cy=40.0, width=131, height=97)
@@ -116,6 +119,15 @@ def test_a_map_of_the_wrong_size_is_refused() -> None:
         )
 
 
+def test_drawn_rectangles_have_the_nominal_jaw_and_not_the_pads_width() -> None:
+    grasps = random_map(0.3, np.random.default_rng(4))
+    grasp = grasps.grasp_at(40, 60)
+    rectangle = grasps.rectangle_of(grasp)
+    assert rectangle.jaw_px / rectangle.width_px == pytest.approx(0.02 / grasp.width)
+    narrow = grasps.rectangle_of(grasp, jaw=FINGER_WIDTH)
+    assert rectangle.jaw_px / narrow.jaw_px == pytest.approx(0.02 / 0.0176)
+
+
 def test_rectangle_corners_and_back_is_the_same_rectangle() -> None:
     for angle in (-1.5, -0.3, 0.0, 1.2):
         rectangle = GraspRectangle(u=40, v=-3, angle=angle, width_px=30, jaw_px=11)
@@ -174,7 +186,7 @@ def test_corners_that_are_not_numbers_are_refused() -> None:
 def test_best_pixel_is_the_argmax_and_the_middle_of_a_flat_top() -> None:
     rng = np.random.default_rng(4)
     quality = rng.random((40, 61)).astype(np.float32)
-    assert best_pixel(quality) == np.unravel_index(np.argmax(quality), quality.shape)
+    assert best_pixel(quality) == divmod(int(np.argmax(quality)), 61)
     quality[10:21, 30:51] = 1.0
     assert best_pixel(quality)[0] == 15
     quality[15, 40] = np.nan

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mpgrasp.statistics import wilson_interval
 from mpgrasp.exceptions import OutputError
+from mpgrasp.statistics import wilson_interval
 from mpgrasp.training.data import shards
 from mpgrasp.training.data import verification as v
 from mpgrasp.training.data.generate_config import GenerateConfig
@@ -24,8 +24,8 @@ Made by
     python -m mpgrasp.training generate --scenes {scenes} --seed {seed} --views {views} --out DIR{options}
 
 {n_scenes} scenes, {n_views} views. A scene is a function of the seed, its index and the format ({format})
-alone (`mpgrasp.training.data.views.make_scene(seed, index)` builds it again). None of the objects is one of the
-evaluation sets', or comes close to the size of one.
+alone (`mpgrasp.training.data.views.make_scene(seed, index)` builds it again). None of the objects is one of
+the evaluation sets', or comes close to the size of one.
 
 ## Lifts
 

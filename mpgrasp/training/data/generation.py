@@ -1,4 +1,4 @@
-"""Making a training set: shards written by worker processes, then the card and the sheet that describe them."""
+"""Making a training set: shards written by worker processes, then the card and the sheet about them."""
 
 from __future__ import annotations
 

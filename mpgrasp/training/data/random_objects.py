@@ -12,16 +12,16 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpgrasp.suite import load_suite, suite_names
 from mpgrasp.geometry import FloatArray
-from mpgrasp.scene.objects.model import ObjectModel
-from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
-from mpgrasp.workspace import WORKSPACE_CENTRE
 from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
+from mpgrasp.scene.objects.model import ObjectModel
+from mpgrasp.suite import load_suite, suite_names
 from mpgrasp.training.data.hollow_families import HOLLOW_FAMILIES
 from mpgrasp.training.data.shapes import Family
 from mpgrasp.training.data.solid_families import SOLID_FAMILIES
 from mpgrasp.training.data.thin_families import THIN_FAMILIES
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 LONGEST = 0.2
 """Longest edge of a bounding box [m]."""

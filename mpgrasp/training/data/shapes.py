@@ -66,7 +66,8 @@ def polygon(rng: np.random.Generator) -> FloatArray:
     """(n, 2) corners in the unit circle, 3 to 8 of them, spread around the centre."""
     n = int(rng.integers(3, 9))
     angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
-    corners: FloatArray = rng.uniform(0.75, 1.0, n)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    radii = rng.uniform(0.75, 1.0, n)
+    corners: FloatArray = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     return corners
 
 

@@ -12,15 +12,15 @@ import numpy as np
 
 from mpgrasp.depth import CROP, NETWORK_SIZE
 from mpgrasp.exceptions import ConfigError, OutputError
-from mpgrasp.files.json_values import difference
 from mpgrasp.files.atomic import replace_file
+from mpgrasp.files.json_values import difference
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.labels import ANGLE_UNIT, DEPTH_UNIT, QUALITY_UNIT
 from mpgrasp.training.data.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMNS
 from mpgrasp.training.data.views import META_COLUMNS
 
 FORMAT = 3
-"""Format of shards and `meta.json`, and of what a seed means: a scene is a function of the seed, its index and this.
+"""Format of shards and `meta.json`, and of a seed's scenes: each is a function of seed, index and format.
 
 When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do
 not show. An object that joins the catalogue or a shipped suite is enough, for training keeps away from it."""

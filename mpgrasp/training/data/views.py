@@ -15,13 +15,13 @@ from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down, rotation_x, rotation_z, transform
 from mpgrasp.height_map import HeightMap
-from mpgrasp.workspace import WORKSPACE_CENTRE
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.training.data.appearance import randomise_appearance
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.labels import QUALITY_UNIT, encode_depth, view_labels
 from mpgrasp.training.data.random_objects import training_scene_config
 from mpgrasp.training.data.verification import verify
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 META_COLUMNS = (
     "camera_height", "scene", "max_thickness", "n_objects", "thin", "cloth_unevenness", "best_quality",

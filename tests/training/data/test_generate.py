@@ -20,8 +20,8 @@ from mpgrasp.camera import rasteriser
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps
 from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError, OutputError
 from mpgrasp.geometry import invert, transform_points
-from mpgrasp.training.data import generation, shards, views
 from mpgrasp.training.__main__ import main
+from mpgrasp.training.data import generation, shards, views
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.generation import Job, generate
 from mpgrasp.training.data.verification import GOOD, TRIAL_COLUMNS, Verified
