@@ -97,23 +97,12 @@ class GraspMap:
         camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
         return transform_points(self.T_world_camera, camera)
 
-    def world_angle(self) -> FloatArray:
-        """Closing directions (H, W) about world z [rad] (eq. 3), for a camera that looks down."""
-        return wrap_half_pi(image_to_world_angle(self.angle, self.T_world_camera))
-
     def world_width(self) -> FloatArray:
         """Openings (H, W) [m] at each pixel's depth (eq. 3)."""
         return self.width * self.depth / self.intrinsics.fx
 
-    def grasp_of(self, rectangle: GraspRectangle) -> Grasp:
-        """Return the grasp that a rectangle of this image stands for, at the nearest pixel's depth."""
-        rows, cols = self.depth.shape
-        row = int(np.clip(np.rint(rectangle.v), 0, rows - 1))
-        col = int(np.clip(np.rint(rectangle.u), 0, cols - 1))
-        return self._grasp(rectangle, row, col)
-
-    def rectangle_of(self, grasp: Grasp, jaw: float = RECTANGLE_JAW) -> GraspRectangle:
-        """Return the rectangle that a grasp, with fingers `jaw` wide [m], covers in this image."""
+    def rectangle_of(self, grasp: Grasp) -> GraspRectangle:
+        """Return the rectangle of a grasp in this image, with jaws `RECTANGLE_JAW` wide."""
         camera = transform_points(invert(self.T_world_camera), np.asarray(grasp.position, float))
         u, v = self.intrinsics.project(camera)
         px_per_metre = self.intrinsics.fx / float(camera[2])
@@ -122,28 +111,19 @@ class GraspMap:
             v=float(v),
             angle=float(world_to_image_angle(grasp.angle, self.T_world_camera)),
             width_px=grasp.width * px_per_metre,
-            jaw_px=jaw * px_per_metre,
+            jaw_px=RECTANGLE_JAW * px_per_metre,
         )
 
     def grasp_at(self, row: int, col: int) -> Grasp:
         """Return the grasp of one pixel in the world (eq. 3)."""
-        rectangle = GraspRectangle(
-            u=float(col),
-            v=float(row),
-            angle=float(self.angle[row, col]),
-            width_px=float(self.width[row, col]),
-            jaw_px=0.0,
-        )
-        return self._grasp(rectangle, row, col)
-
-    def _grasp(self, rectangle: GraspRectangle, row: int, col: int) -> Grasp:
         z = float(self.depth[row, col])
         k = self.intrinsics
-        camera = k.deproject(np.array(rectangle.u), np.array(rectangle.v), np.array(z))
+        camera = k.deproject(np.array(float(col)), np.array(float(row)), np.array(z))
+        angle = image_to_world_angle(float(self.angle[row, col]), self.T_world_camera)
         return Grasp(
             position=transform_points(self.T_world_camera, camera),
-            angle=float(wrap_half_pi(image_to_world_angle(rectangle.angle, self.T_world_camera))),
-            width=rectangle.width_px * z / k.fx,
+            angle=float(wrap_half_pi(angle)),
+            width=float(self.width[row, col]) * z / k.fx,
             quality=float(self.quality[row, col]),
         )
 
@@ -180,26 +160,8 @@ class GraspRectangle:
     jaw_px: float
     """Width of the fingers, across the closing direction [px]."""
 
-    @classmethod
-    def from_corners(cls, corners: FloatArray) -> GraspRectangle:
-        """From corners (4, 2) as (u, v) whose first edge runs along the closing direction [px]."""
-        corners = np.asarray(corners, float)
-        if corners.shape != (4, 2) or not np.isfinite(corners).all():
-            raise ConfigError(
-                "unusable grasp rectangle", got=corners.tolist(), allowed="4 finite corners (u, v)"
-            )
-        edge, side = corners[1] - corners[0], corners[2] - corners[1]
-        u, v = corners.mean(axis=0)
-        return cls(
-            u=float(u),
-            v=float(v),
-            angle=float(wrap_half_pi(np.arctan2(-edge[1], edge[0]))),
-            width_px=float(np.hypot(*edge)),
-            jaw_px=float(np.hypot(*side)),
-        )
-
     def corners(self) -> FloatArray:
-        """Corners (4, 2) as (u, v) [px]; the first edge runs along the closing direction."""
+        """Return corners (4, 2) as (u, v) [px]; the first edge runs along the closing direction."""
         along = np.array([np.cos(self.angle), -np.sin(self.angle)]) * self.width_px / 2
         across = np.array([np.sin(self.angle), np.cos(self.angle)]) * self.jaw_px / 2
         corners = np.array([-along - across, along - across, along + across, -along + across])
@@ -207,7 +169,7 @@ class GraspRectangle:
         return result
 
     def iou(self, other: GraspRectangle) -> float:
-        """Area shared with `other` over the area of both together, in [0, 1]."""
+        """Return the area shared with `other` over the area of both together, in [0, 1]."""
         mine, theirs = self.width_px * self.jaw_px, other.width_px * other.jaw_px
         if min(mine, theirs) <= 0:
             return 0.0

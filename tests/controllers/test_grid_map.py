@@ -11,8 +11,8 @@ from toy_views import Blob, blob_map, flat_map
 from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, GridConfig, GridMap
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import line_angle_difference, looking_down
-from mpgrasp.grasp import GraspMap
+from mpgrasp.geometry import line_angle_difference, looking_down, wrap_half_pi
+from mpgrasp.grasp import GraspMap, image_to_world_angle
 
 SMALL = GridConfig(extent=0.1, cell=0.02)
 WIDE = CameraIntrinsics(fx=90.0, fy=80.0, cx=40.0, cy=20.0, width=83, height=47)
@@ -62,7 +62,8 @@ def test_histograms_agree_with_counting_pixel_by_pixel(yaw: float) -> None:
     grid, view = GridMap(SMALL), random_map(yaw, 0)
     grid.update(view)
     expected = np.zeros_like(grid.counts)
-    points, angles = view.world_points(), view.world_angle()
+    points = view.world_points()
+    angles = wrap_half_pi(image_to_world_angle(view.angle, view.T_world_camera))
     for row, col in np.ndindex(view.depth.shape):
         x, y, z = points[row, col]
         if np.isfinite(z) and abs(x - 0.5) < 0.05 and abs(y) < 0.05 and -0.01 <= z <= 0.17:
