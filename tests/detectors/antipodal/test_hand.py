@@ -18,3 +18,7 @@ def test_pads_tips_and_opening_are_the_franka_hands() -> None:
 
 def test_tips_reach_as_deep_as_execution_sends_them() -> None:
     assert HandGeometry().reach == pytest.approx(ExecutionConfig().palm_depth)
+
+
+def test_the_margin_leaves_room_for_the_opening_that_execution_adds() -> None:
+    assert HandGeometry().opening_margin == pytest.approx(ExecutionConfig().opening_margin)
