@@ -58,7 +58,7 @@ class Grasp:
     """Chance of success as the detector sees it, in [0, 1]."""
 
     def T_world_grasp(self) -> FloatArray:
-        """Pose (4, 4) of the grasp frame."""
+        """Return the pose (4, 4) of the grasp frame."""
         # looking_down(yaw) has its y axis at heading yaw - pi/2
         return looking_down(self.position, self.angle + np.pi / 2)
 
@@ -92,13 +92,13 @@ class GraspMap:
                 )
 
     def world_points(self) -> FloatArray:
-        """World points (H, W, 3) [m] of all pixels (eq. 3)."""
+        """Return world points (H, W, 3) [m] of all pixels (eq. 3)."""
         v, u = np.mgrid[: self.intrinsics.height, : self.intrinsics.width]
         camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
         return transform_points(self.T_world_camera, camera)
 
     def world_width(self) -> FloatArray:
-        """Openings (H, W) [m] at each pixel's depth (eq. 3)."""
+        """Return openings (H, W) [m] at each pixel's depth (eq. 3)."""
         return self.width * self.depth / self.intrinsics.fx
 
     def rectangle_of(self, grasp: Grasp) -> GraspRectangle:
@@ -129,7 +129,7 @@ class GraspMap:
 
 
 def image_to_world_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
-    """Heading in the world's xy plane [rad] of image directions at `angle` [rad], any shape."""
+    """Return the heading in the world's xy plane [rad] of image directions at `angle` [rad], any shape."""
     # (du, dv) = (cos, -sin) is the camera-frame direction (cos, -sin, 0)
     c, s = np.cos(angle), np.sin(angle)
     R = T_world_camera[:3, :3]
@@ -182,7 +182,7 @@ class GraspRectangle:
 
 
 def best_pixel(quality: FloatArray) -> tuple[int, int]:
-    """(row, col) of the highest quality (H, W); of a flat top, the pixel that lies deepest inside.
+    """Return (row, col) of the highest quality (H, W); of a flat top, the pixel that lies deepest inside.
 
     NaN and -inf never win; where nothing is finite the answer is (0, 0).
     """
@@ -200,7 +200,7 @@ def best_pixel(quality: FloatArray) -> tuple[int, int]:
 def peaks(
     quality: FloatArray, *, threshold: float = 0.1, distance: float = 10.0, count: int | None = None
 ) -> NDArray[np.intp]:
-    """Local maxima (n, 2) as (row, col), best first, at least `distance` [px] apart and above `threshold`.
+    """Return local maxima (n, 2) as (row, col), best first, `distance` [px] or more apart, above `threshold`.
 
     Of maxima that are closer than that, the better one stays (non-maximum suppression).
     """

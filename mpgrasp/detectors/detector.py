@@ -19,7 +19,7 @@ class GraspDetector(Protocol):
         ...
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame; quality is zero everywhere where the image says nothing."""
+        """Return the grasp map of the frame; quality is zero everywhere where the image says nothing."""
         ...
 
 

@@ -85,7 +85,7 @@ class NetworkDetector:
         config: NetworkDetectorConfig | None = None,
         runtime: str | Runtime = "auto",
     ) -> NetworkDetector:
-        """The detector of that name with weights from a file, by default the shipped ones.
+        """Return the detector of that name with weights from a file, by default the shipped ones.
 
         Raises:
             ConfigError: unknown runtime, or OpenVINO where there is none.
@@ -135,7 +135,7 @@ class NetworkDetector:
         """Start an episode; a network knows nothing but images."""
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame's central square; quality is zero where image or network say nothing.
+        """Return the grasp map of the frame's central square; quality is 0 where nothing can be said.
 
         Raises:
             ConfigError: a network that reads colour got a frame without it.
@@ -156,7 +156,7 @@ class NetworkDetector:
     def grasp_arrays(
         self, depth: Float32, rgb: NDArray[np.uint8] | None = None
     ) -> tuple[Float32, Float32, Float32]:
-        """Quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN.
+        """Return quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN.
 
         All are zero where the network's output is not finite: broken weights must not choose a grasp.
         """
@@ -167,7 +167,7 @@ class NetworkDetector:
         return postprocess(heads, self.weights.width_px, self.config)
 
     def _heads(self, image: Float32) -> Float32:
-        """Raw heads (4, size, size) for an input (channels, size, size)."""
+        """Return raw heads (4, size, size) for an input (channels, size, size)."""
         self.warm_up()
         assert self._runtime is not None
         return self._runtime(image)
@@ -176,7 +176,7 @@ class NetworkDetector:
 def postprocess(
     heads: Float32, width_px: float, config: NetworkDetectorConfig | None = None
 ) -> tuple[Float32, Float32, Float32]:
-    """Quality in [0, 1], angle [rad] and width [px], each (H, W), from the raw heads (4, H, W)."""
+    """Return quality in [0, 1], angle [rad] and width [px], each (H, W), from the raw heads (4, H, W)."""
     c = config or NetworkDetectorConfig()
     pos, cos, sin, width = heads
     quality = np.clip(_smooth(pos, c.quality_sigma), 0.0, 1.0)

@@ -47,7 +47,7 @@ class OracleDetector:
         self._grasps = antipodal_grasps(truth, self.hand)
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasps of the frame's central crop; pixels without depth have none.
+        """Return grasps of the frame's central square; pixels without depth have none.
 
         Raises:
             ConfigError: before the first `reset`.

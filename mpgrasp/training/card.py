@@ -39,7 +39,7 @@ class TrainingRecord:
     """Validation figures of the weights that were kept."""
 
     def card(self) -> dict[str, Any]:
-        """Command, data with their verification, seed, steps, time, settings, metrics, licence."""
+        """Return command, data with their verification, seed, steps, time, settings, metrics, licence."""
         config = self.config
         return {
             "command": self.command,

@@ -106,7 +106,7 @@ class GraspDataset:
         return len(self._place)
 
     def column(self, name: str) -> NDArray[np.float32] | None:
-        """(n,) values of a meta column, or None where shards have no such column."""
+        """Return values (n,) of a meta column, or None where shards have no such column."""
         return self.meta[:, self.columns.index(name)] if name in self.columns else None
 
     def _scenes(self) -> NDArray[np.int64]:
@@ -119,7 +119,7 @@ class GraspDataset:
         return len(np.unique(self._scenes()[self.training]))
 
     def description(self) -> list[dict[str, object]]:
-        """For each directory its name, how many shards were read, what its meta.json tells, and the lifts."""
+        """Return each directory's name, number of shards, facts from its meta.json, and lifts."""
         about: list[dict[str, object]] = []
         for directory, meta in self._told.items():
             shards = sum(path.parent == directory for path in self._paths)
@@ -146,7 +146,7 @@ class GraspDataset:
         return {"lifts": {k: [int(told["lifted"][m].sum()), int(m.sum())] for k, m in groups.items()}}
 
     def scene(self, index: int) -> tuple[int, int]:
-        """Seed and number of the scene that image `index` shows, as `make_scene` takes them.
+        """Return seed and number of the scene that image `index` shows, as `make_scene` takes them.
 
         Raises:
             ConfigError: shards that do not tell.
@@ -158,7 +158,7 @@ class GraspDataset:
         return int(self._told[directory]["seed"]), int(scenes[index])
 
     def sample(self, index: int) -> Sample:
-        """Image `index` as it is."""
+        """Return image `index` as it is."""
         shard, row = self._place[index]
         arrays = self._shards[shard]
         return Sample(
@@ -177,7 +177,7 @@ class GraspDataset:
         rng: np.random.Generator | None = None,
         augmentation: Augmentation | None = None,
     ) -> Batch:
-        """Inputs and labels of those images, augmented where there is an rng."""
+        """Return inputs and labels of those images, augmented where there is an rng."""
         samples = [self.sample(int(i)) for i in indices]
         if rng is not None:
             samples = [augment(s, augmentation or Augmentation(), rng) for s in samples]
@@ -192,6 +192,6 @@ class GraspDataset:
 
 
 def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
-    """Which images to hold out: a hash of the scene decides, so that it stays when more shards come."""
+    """True for images to hold out: a hash of the scene decides, so that it stays when more shards come."""
     hashed = (scenes.astype(np.uint64) * np.uint64(2654435761)) % np.uint64(2**32)
     return hashed / 2**32 < share

@@ -17,7 +17,7 @@ from mpgrasp.training.data.generate_config import GenerateConfig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `python -m mpgrasp.training generate`."""
+    """Add the options of `python -m mpgrasp.training generate`."""
     parser.add_argument("--scenes", type=int, default=1000, help="number of scenes (default: %(default)s)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the shards go")
     parser.add_argument(

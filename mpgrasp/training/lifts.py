@@ -64,7 +64,7 @@ class LiftCheck:
 
 
 def images_to_lift(dataset: GraspDataset, images: NDArray[np.intp], count: int) -> list[int]:
-    """`count` of the images that have a labelled grasp, of as many scenes as possible.
+    """Return `count` of the images that have a labelled grasp, of as many scenes as possible.
 
     Raises:
         ConfigError: the shards tell neither scene nor pose.

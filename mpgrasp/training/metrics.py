@@ -103,7 +103,7 @@ def summarise(
     dataset: GraspDataset,
     lifted: Mapping[int, bool] | None = None,
 ) -> dict[str, float]:
-    """Rates over images with a labelled grasp, for all and by group; and what is claimed where there is none.
+    """Return rates over images with a labelled grasp, for all and by group, and claims where there is none.
 
     Keys: score, hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the
     same of images without any label), n; lift and n_lift, of the images whose best grasp was executed;

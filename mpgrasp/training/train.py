@@ -24,7 +24,7 @@ NOT_OPTIONS = ("name", "command", "run", "default_of")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
+    """Add the options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
     defaults = TrainConfig(name="dhrnet")
     loss, image = defaults.loss, defaults.input
     parser.set_defaults(default_of=parser.get_default)
@@ -135,7 +135,7 @@ def main(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _stopping(trainer: Trainer) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM ends the run between two steps, so that it can be resumed to the bit."""
+    """Let the first Ctrl-C or SIGTERM end the run between two steps, so that it resumes to the bit."""
 
     def stop(signum: int, frame: object) -> None:
         trainer.stop()

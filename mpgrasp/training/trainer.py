@@ -164,7 +164,7 @@ class Trainer:
         return self.best
 
     def train_step(self, batch: tuple[Tensor, ...]) -> Tensor:
-        """One step of the optimiser on (image, quality, angle, width, valid); returns the losses `PARTS`."""
+        """Take one step on (image, quality, angle, width, valid) and return the losses `PARTS`."""
         self.network.train()
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.lr * rate_at(self.progress, self.config.schedule)

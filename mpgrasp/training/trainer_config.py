@@ -72,9 +72,9 @@ class TrainConfig:
     holdout: float = 0.08
     """Share of scenes for validation."""
     validation_images: int = 384
-    """At most so many images are validated on."""
+    """Largest number of images that are validated on."""
     lift_images: int = 48
-    """At most so many of them are also grasped in simulation, where the network would."""
+    """Largest number of them that are also grasped in simulation, where the network would."""
     validate_every: float = 0.1
     """Share of the budget between validations."""
 

@@ -50,7 +50,7 @@ class Validator:
 
     @torch.inference_mode()
     def evaluate(self, network: nn.Module) -> dict[str, float]:
-        """See metrics.summarise; and "validation_loss". The network is left in evaluation mode."""
+        """Return metrics.summarise and "validation_loss"; the network is left in evaluation mode."""
         network.eval()
         images, lift = self.images, self._chosen_to_lift()
         matches, graspable, lifted = {}, {}, {}
@@ -69,7 +69,7 @@ class Validator:
         return summary | ({"validation_loss": total / len(images)} if len(images) else {})
 
     def _run(self, network: nn.Module, chunk: np.ndarray) -> tuple[np.ndarray, float]:
-        """Raw heads (n, 4, H, W), and the mean loss."""
+        """Return raw heads (n, 4, H, W), and the mean loss."""
         batch = self._data.batch(chunk, self._config.input)
         image, quality, angle, width, valid = (t.to(self._device) for t in to_tensors(batch, self._width_px))
         low = self._config.precision == "bfloat16"

@@ -37,7 +37,7 @@ class HandGeometry:
     camera_clearance: float = 0.070
     """Height above the tips that nothing under the wrist camera may exceed [m]."""
     camera_offset: float = 0.070
-    """From the tool point to the camera, across the closing direction and on either side [m]."""
+    """Distance from the tool point to the camera, across the closing direction and on either side [m]."""
     camera_size: tuple[float, float] = (0.094, 0.034)
     """The camera along and across the closing direction, with a little play [m]."""
     tip_clearance: float = 0.0005

@@ -19,11 +19,11 @@ LEVEL_STEP = 0.008
 ANGLE_TOLERANCE = np.deg2rad(10.0)
 """Misalignment of the edges that halves a grasp's worth, roughly; the object would be turned [rad]."""
 OFFSET_TOLERANCE = 0.004
-"""Likewise the offset of the centre from the middle between the contacts [m]."""
+"""Offset of the centre from the middle between the contacts that halves the worth likewise [m]."""
 UNEVENNESS_TOLERANCE = 0.003
-"""Likewise how far the pads' first contact stands out of the mean edge [m]."""
+"""Distance by which the first contact stands out of the mean edge that halves it likewise [m]."""
 ARM_TOLERANCE = 0.025
-"""Likewise the distance of the grasp from the object's centre of mass [m]."""
+"""Distance of the grasp from the object's centre of mass that halves it likewise [m]."""
 SLANT = np.deg2rad(5.0)
 """Misalignment that the fit of the edges makes good afterwards [rad]."""
 FULL_CONTACT = 0.012
@@ -69,7 +69,7 @@ class TurnedMap:
         self.rows = (np.arange(n_rows, dtype=np.float32) - n_rows / 2)[:, None]
 
     def levels(self) -> list[float]:
-        """Tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
+        """Return tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
         return [0.0, *np.arange(LEVEL_STEP, self.top - 0.004, LEVEL_STEP)] if self.top > 0.014 else [0.0]
 
     def around(self, level: float) -> tuple[TurnedMap | None, tuple[slice, slice]]:
@@ -179,7 +179,7 @@ class TurnedMap:
         result[r[better], c[better]] = np.column_stack([q, opening, edges.turn])[better]
 
     def _runs(self, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First and last column (h, w) of the row-wise run of `mask` that holds each cell."""
+        """Return the first and last column (h, w) of the row-wise run of `mask` that holds each cell."""
         n = mask.shape[1]
         padded = np.pad(mask, ((0, 0), (1, 1)))
         starts = mask & ~padded[:, :-2]
@@ -189,7 +189,7 @@ class TurnedMap:
         return first, last
 
     def _free(self, mask: np.ndarray, r: np.ndarray, a: np.ndarray, b: np.ndarray) -> FloatArray:
-        """Free length [m] beside columns a and b of rows r, the lesser of both sides."""
+        """Return the free length [m] beside columns a and b of rows r, the lesser of both sides."""
         n = mask.shape[1]
         before = np.maximum.accumulate(np.where(mask, self.columns, -n), axis=1)
         after = np.minimum.accumulate(np.where(mask, self.columns, 2 * n)[:, ::-1], axis=1)[:, ::-1]
@@ -199,7 +199,7 @@ class TurnedMap:
         return free
 
     def _edges(self, solid: np.ndarray, on_cloth: bool, r: np.ndarray, c: np.ndarray) -> _Edges:
-        """Straight lines through both edges of the runs within the pad's width around cells (r, c)."""
+        """Fit straight lines to both edges of the runs within the pad's width around cells (r, c)."""
         n_columns = solid.shape[1]
         first, last = self._runs(solid > 0)
         mask = (solid > 0).astype(np.float32)
@@ -260,10 +260,10 @@ def _bell(x: FloatArray) -> FloatArray:
 
 
 def odd(cells: float) -> int:
-    """Nearest odd whole number, so that a filter has a centre."""
+    """Return the nearest odd whole number, so that a filter has a centre."""
     return max(2 * round((cells - 1) / 2) + 1, 1)
 
 
 def _highest(height: Float32, rows: int, cols: int) -> Float32:
-    """Greatest height in a window of (rows, cols) around each cell."""
+    """Return the greatest height in a window of (rows, cols) around each cell."""
     return np.asarray(cv2.dilate(height, np.ones((rows, cols), np.uint8)))

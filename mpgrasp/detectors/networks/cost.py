@@ -41,12 +41,12 @@ are not counted. More input channels only enlarge the first convolution.
 
 
 def parameters(network: nn.Module) -> int:
-    """Number of values that training learns."""
+    """Return the number of values that training learns."""
     return sum(p.numel() for p in network.parameters())
 
 
 def flops(network: nn.Module, channels: int, size: int) -> float:
-    """2 x multiply-adds of convolutions and matrix products for one (channels, size, size) image."""
+    """Return 2 x multiply-adds of convolutions and matrix products for a (channels, size, size) image."""
     import torch
     from torch.utils.flop_counter import FlopCounterMode
 

@@ -29,7 +29,7 @@ class GraspNetwork(nn.Module):
             nn.init.normal_(getattr(self, f"{name}_output").weight, std=HEAD_STD)
 
     def maps(self, features: Tensor, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Quality, cosine, sine and width, (n, 1, H, W) each, of features (n, f, h, w) for an image x."""
+        """Return the four heads, (n, 1, H, W) each, of features (n, f, h, w) for an image x."""
         heads = [getattr(self, f"{name}_output") for name in HEADS]
         # one convolution instead of four saves a tenth of a training step
         weight, bias = torch.cat([h.weight for h in heads]), torch.cat([h.bias for h in heads])
@@ -39,12 +39,12 @@ class GraspNetwork(nn.Module):
 
 
 def resize(x: Tensor, like: Tensor) -> Tensor:
-    """Bilinear resizing to the height and width of another tensor."""
+    """Resize, bilinearly, to the height and width of another tensor."""
     return F.interpolate(x, size=like.shape[-2:], mode="bilinear", align_corners=False)
 
 
 def conv_bn(inputs: int, outputs: int, kernel: int, *, stride: int = 1, relu: bool = True) -> nn.Sequential:
-    """Convolution that keeps the size (up to its stride), batch norm and, on request, ReLU."""
+    """Return a convolution that keeps the size (up to its stride), batch norm and, on request, ReLU."""
     layers: list[nn.Module] = [
         nn.Conv2d(inputs, outputs, kernel, stride=stride, padding=kernel // 2, bias=False),
         nn.BatchNorm2d(outputs, momentum=BN_MOMENTUM),

@@ -1,4 +1,4 @@
-"""From an image without holes to what a network reads: the same in training and in the loop.
+"""Input of a network, made from an image without holes: the same in training and in the loop.
 
 The paper feeds depth (D), colour (RGB) or both (RGB-D). The published GG-CNN code feeds depth minus its mean,
 in metres, clipped to +-1. A stick 4 mm high is then a step of 0.004, below what a freshly initialised
@@ -68,7 +68,7 @@ class NetworkInput:
     def __call__(
         self, depth: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
     ) -> NDArray[np.float32]:
-        """Input (channels, H, W) for a depth image (H, W) [m] without NaN, and colour (H, W, 3).
+        """Return the input (channels, H, W) for a depth image (H, W) [m] without NaN, and colour (H, W, 3).
 
         Raises:
             ConfigError: the modality has colour and there is none, or one of another size.

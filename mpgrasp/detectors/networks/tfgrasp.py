@@ -161,7 +161,7 @@ class _Block(nn.Module):
         return y
 
     def _windowed(self, x: Tensor) -> Tensor:
-        """Attention in windows over (n, side, side, width), rolled by the shift and back."""
+        """Attend in windows over (n, side, side, width), rolled by the shift and back."""
         n, width, w, across = x.shape[0], x.shape[-1], self.window, self.side // self.window
         if self.shift:
             x = x.roll((-self.shift, -self.shift), dims=(1, 2))
@@ -192,7 +192,7 @@ class _Attention(nn.Module):
         self.offsets: Tensor
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
-        """X (n * windows, tokens, width); mask (windows, 1, tokens, tokens) or None -> as x."""
+        """Attend in windows: x (n * windows, tokens, width), mask (windows, 1, tokens, tokens) or None."""
         tokens, width = x.shape[1:]
         qkv = self.qkv(x).reshape(-1, tokens, 3, self.heads, width // self.heads)
         q, k, v = qkv.permute(2, 0, 3, 1, 4).unbind(0)  # each (n * windows, heads, tokens, width / heads)
@@ -210,7 +210,7 @@ class _Attention(nn.Module):
 
 
 def _offsets(window: int) -> Tensor:
-    """Index of the relative position of each pair of a window's tokens, (tokens, tokens)."""
+    """Return the index of the relative position of each pair of a window's tokens, (tokens, tokens)."""
     row, col = (a.flatten() for a in torch.meshgrid(*[torch.arange(window)] * 2, indexing="ij"))
     down, right = (a[:, None] - a[None, :] + window - 1 for a in (row, col))
     return down * (2 * window - 1) + right
@@ -254,7 +254,7 @@ class _Expand(nn.Module):
         self.norm = nn.LayerNorm(outputs)
 
     def parts(self, x: Tensor) -> Tensor:
-        """(n, H, W, width) -> (n, H, W, factor, factor, outputs)."""
+        """Expand tokens (n, H, W, width) to (n, H, W, factor, factor, outputs)."""
         n, height, across, _ = x.shape
         y: Tensor = self.norm(self.expand(x).reshape(n, height, across, self.factor, self.factor, -1))
         return y

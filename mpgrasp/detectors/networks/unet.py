@@ -19,7 +19,7 @@ class UNet(FCN):
     skips = True
 
     def join(self, decoded: Tensor, encoded: Tensor) -> Tensor:
-        """Both, concatenated."""
+        """Return both, concatenated."""
         return torch.cat([decoded, encoded], dim=1)
 
 

@@ -27,7 +27,7 @@ of 300 px, as in the published GG-CNN files."""
 
 
 def width_unit(size: int) -> float:
-    """Opening that a width output of 1 stands for in networks trained here on images of that side [px]."""
+    """Return the opening that a width output of 1 stands for in networks trained here on such images [px]."""
     return WIDTH_SHARE * size
 
 
@@ -75,7 +75,7 @@ def save_weights(
 
 
 def default_weights(name: str) -> Path:
-    """Path of a network's shipped weights."""
+    """Return the path of a network's shipped weights."""
     return paths.WEIGHTS / f"{name}.safetensors"
 
 

@@ -41,7 +41,7 @@ class Runtime(Protocol):
     """True if it was compiled before, and only had to be read."""
 
     def __call__(self, image: Float32) -> Float32:
-        """Heads (4, H, W) for an input (channels, H, W): quality, cosine, sine, width."""
+        """Return heads (4, H, W) for an input (channels, H, W): quality, cosine, sine, width."""
         ...
 
 
@@ -86,7 +86,7 @@ def check_runtime(runtime: str) -> None:
 
 
 def runtime_name(runtime: str) -> str:
-    """Name that `make_runtime` is going to give: "openvino bf16", say. Compiles nothing."""
+    """Return the name that `make_runtime` is going to give: "openvino bf16", say. Compiles nothing."""
     check_runtime(runtime)
     cuda = torch.cuda.is_available()
     precision = None if runtime == "torch" or (runtime == "auto" and cuda) else openvino_precision()
@@ -100,7 +100,7 @@ def runtime_name(runtime: str) -> str:
 
 
 def make_runtime(weights: NetworkWeights, runtime: str = "auto") -> Runtime:
-    """The network, ready to be run; OpenVINO compiles it, or reads what it compiled before.
+    """Return the network, ready to be run; OpenVINO compiles it, or reads what it compiled before.
 
     Raises:
         ConfigError: unknown runtime, or OpenVINO was asked for and cannot run this network.
@@ -120,7 +120,7 @@ def make_runtime(weights: NetworkWeights, runtime: str = "auto") -> Runtime:
 
 
 def fold_batch_norms(network: nn.Module) -> nn.Module:
-    """Convolution and batch norm that follow each other become one convolution: same function, less time."""
+    """Make one convolution of each that a batch norm follows: same function, less time."""
     for name, child in network.named_children():
         if isinstance(child, nn.Sequential):
             layers = list(child)

@@ -41,7 +41,7 @@ class ViewLabels:
 
 
 def view_labels(grasps: WorldGrasps, image: DepthFrame) -> ViewLabels:
-    """Labels of a view, from its true depth at the network's resolution."""
+    """Return the labels of a view, from its true depth at the network's resolution."""
     view = grasps_in_view(grasps, image)
     points = image.world_points()
     row, col, inside = grasps.height_map.cells(points[..., 0], points[..., 1])
@@ -54,21 +54,21 @@ def view_labels(grasps: WorldGrasps, image: DepthFrame) -> ViewLabels:
 
 
 def encode_angle(angle: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Bins of `ANGLE_UNIT` over [-pi/2, pi/2); the step above the last bin is the first, half a turn on."""
+    """Return bins of `ANGLE_UNIT` over [-pi/2, pi/2); above the last comes the first, half a turn on."""
     return (np.rint((np.asarray(angle, float) + np.pi / 2) / ANGLE_UNIT).astype(int) % 256).astype(np.uint8)
 
 
 def decode_angle(bins: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Angles [rad] of bins."""
+    """Return the angles [rad] of bins."""
     return (bins.astype(np.float32) * np.float32(ANGLE_UNIT) - np.float32(np.pi / 2)).astype(np.float32)
 
 
 def encode_depth(depth: NDArray[np.floating]) -> NDArray[np.uint16]:
-    """Steps of `DEPTH_UNIT`; 0 = no return, as is anything beyond what 16 bits hold (3.28 m)."""
+    """Return steps of `DEPTH_UNIT`; 0 = no return, as is anything beyond what 16 bits hold (3.28 m)."""
     steps = np.rint(np.nan_to_num(depth, nan=0.0) / DEPTH_UNIT)
     return np.where((steps > 0) & (steps < 65536), steps, 0).astype(np.uint16)
 
 
 def decode_depth(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Depth [m]; NaN where there was no return."""
+    """Return depth [m]; NaN where there was no return."""
     return np.where(steps > 0, steps * np.float32(DEPTH_UNIT), np.float32(np.nan)).astype(np.float32)

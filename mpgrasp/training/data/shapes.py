@@ -63,7 +63,7 @@ def letter(rng: np.random.Generator, height: float, width: float, length: float)
 
 
 def polygon(rng: np.random.Generator) -> FloatArray:
-    """(n, 2) corners in the unit circle, 3 to 8 of them, spread around the centre."""
+    """Draw corners (n, 2) in the unit circle, 3 to 8 of them, spread around the centre."""
     n = int(rng.integers(3, 9))
     angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
     radii = rng.uniform(0.75, 1.0, n)

@@ -82,7 +82,7 @@ def shard_path(out: Path, first_scene: int) -> Path:
 
 
 def planned(config: GenerateConfig, out: Path) -> dict[Path, range]:
-    """Paths of all shards of the set, and the scenes in each."""
+    """Return the paths of all shards of the set, and the scenes in each."""
     return {
         shard_path(out, first): range(first, min(first + SHARD_SCENES, config.scenes))
         for first in range(0, config.scenes, SHARD_SCENES)
@@ -90,7 +90,7 @@ def planned(config: GenerateConfig, out: Path) -> dict[Path, range]:
 
 
 def unfinished(config: GenerateConfig, out: Path) -> dict[Path, range]:
-    """Those planned shards that are not there with exactly their scenes; an unreadable one is not there.
+    """Return planned shards that are not there with exactly their scenes; an unreadable one is not there.
 
     Raises:
         ConfigError: the directory holds scenes beyond the last, which training would read too.
@@ -112,7 +112,7 @@ def unfinished(config: GenerateConfig, out: Path) -> dict[Path, range]:
 
 
 def _scenes(path: Path) -> list[int]:
-    """The scene that each row of a shard shows; none where it cannot be read."""
+    """Return the scene that each row of a shard shows; none where it cannot be read."""
     try:
         with np.load(path) as arrays:
             scenes: list[int] = arrays["meta"][:, META_COLUMNS.index("scene")].astype(int).tolist()
@@ -122,7 +122,7 @@ def _scenes(path: Path) -> list[int]:
 
 
 def write_shard(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """An npz file, packed fast, whose bytes depend on the arrays alone; there at once, or not at all.
+    """Write an npz file, packed fast, whose bytes depend on the arrays alone; at once, or not at all.
 
     Raises:
         OutputError: it cannot be written.

@@ -60,7 +60,7 @@ class Verified:
     """The analysis after the lifts have corrected it, and their record."""
 
     grasps: WorldGrasps
-    """With corrected quality."""
+    """The grasps with corrected quality."""
     trials: NDArray[np.float32]
     """(m, len(TRIAL_COLUMNS))"""
 
@@ -125,7 +125,7 @@ def verify(
 
 
 def corrected(grasps: WorldGrasps, trials: list[_Trial]) -> WorldGrasps:
-    """The same grasps, their quality lowered to what the lifts near them leave of it."""
+    """Return the grasps with their quality lowered to what the lifts near them leave of it."""
     quality, truth = grasps.quality, grasps.height_map
     lifted, lost = np.zeros_like(quality), np.zeros_like(quality)
     for t in trials:
@@ -140,7 +140,7 @@ def corrected(grasps: WorldGrasps, trials: list[_Trial]) -> WorldGrasps:
 
 
 def draw_positives(grasps: WorldGrasps, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """Cells (row, col) with a grasp, spread over the objects and over the range of quality."""
+    """Draw cells (row, col) with a grasp, spread over the objects and over the range of quality."""
     label, quality = grasps.height_map.label, grasps.quality
     objects = np.unique(label[quality > 0])
     if not len(objects):
@@ -160,7 +160,7 @@ def draw_positives(grasps: WorldGrasps, rng: np.random.Generator) -> list[tuple[
 
 
 def draw_negatives(truth: HeightMap, rng: np.random.Generator) -> list[tuple[int, int, float]]:
-    """Cells (row, col) on objects, and angles [rad] at which the analysis has no grasp there."""
+    """Draw cells (row, col) on objects, and angles [rad] at which the analysis has no grasp there."""
     drawn = []
     for _ in range(NEGATIVES):
         angle = float(rng.uniform(-np.pi / 2, np.pi / 2))
@@ -174,7 +174,7 @@ def draw_negatives(truth: HeightMap, rng: np.random.Generator) -> list[tuple[int
 def draw_audits(
     shipped: WorldGrasps, tried: set[tuple[int, int]], rng: np.random.Generator
 ) -> list[tuple[int, int]]:
-    """Cells (row, col) of shipped quality `GOOD` or better that were not lifted before, any object alike."""
+    """Draw cells (row, col) of shipped quality `GOOD` or better that were not lifted, any object alike."""
     fresh = shipped.quality >= GOOD
     for cell in tried:
         fresh[cell] = False
@@ -193,7 +193,7 @@ def _any_cell(mask: np.ndarray, rng: np.random.Generator) -> tuple[int, int]:
 
 
 def _point(truth: HeightMap, row: int, col: int) -> FloatArray:
-    """(3,) point of the surface [m]."""
+    """Return the point (3,) of the surface [m]."""
     return np.array([truth.x0 + col * truth.cell, truth.y0 + row * truth.cell, float(truth.height[row, col])])
 
 
@@ -207,7 +207,7 @@ def _grasp_at(grasps: WorldGrasps, row: int, col: int) -> Grasp:
 
 
 def _object_heights(truth: HeightMap) -> FloatArray:
-    """(n_labels,) by label: how high each object rises over the cloth [m]."""
+    """Return the height (n_labels,) by label to which each object rises over the cloth [m]."""
     heights = np.zeros(int(truth.label.max()) + 1)
     np.maximum.at(heights, truth.label, truth.height - truth.support)
     return heights
