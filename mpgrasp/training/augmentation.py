@@ -56,7 +56,7 @@ class Sample:
     """(H, W, 3), where colour was asked for."""
 
     def resized(self, size: int) -> Sample:
-        """Return the sample at `size` px: each pixel takes the old one under its centre, widths are scaled."""
+        """Return the sample at `size` px: a pixel takes the old one under its centre, widths are scaled."""
         rows, cols = self.depth.shape
         if rows == cols == size:
             return self
@@ -110,7 +110,7 @@ def _recoloured(
 
 
 def warp(sample: Sample, turn: float, zoom: float) -> Sample:
-    """Return the sample turned by `turn` [rad], counter-clockwise on screen, and zoomed about its centre."""
+    """Return the sample turned by `turn` [rad], counter-clockwise on screen, and magnified."""
     rows, cols = sample.depth.shape
     matrix = cv2.getRotationMatrix2D(((cols - 1) / 2, (rows - 1) / 2), np.rad2deg(turn), zoom)
 
