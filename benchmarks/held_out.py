@@ -33,10 +33,9 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import Grasp, best_pixel, peak_height
 from mpgrasp.motion.lift_trial import LiftRig
 from mpgrasp.scene.scene import Scene
-from mpgrasp.training.data.views import CAMERA_HEIGHT, stored_intrinsics, stored_pose
+from mpgrasp.training.data.views import CAMERA_HEIGHT, make_scene, stored_intrinsics, stored_pose
 from mpgrasp.training.dataset import GraspDataset
-from mpgrasp.training.generate import make_scene
-from mpgrasp.training.metrics import judge
+from mpgrasp.training.metrics import match_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,7 +92,8 @@ def propose(
         for name, detector in detectors.items():
             detector.reset(truth if reads_truth(detector) else None)
             found = detector.predict(frame)
-            verdict = judge(found.quality, found.angle, found.width, sample.resized(len(found.quality)))
+            labels = sample.resized(len(found.quality))
+            verdict = match_labels(found.quality, found.angle, found.width, labels)
             grasp = found.grasp_at(*best_pixel(found.quality))
             line = {
                 "detector": name,

@@ -16,7 +16,7 @@ from mpgrasp.exceptions import ConfigError
 
 if TYPE_CHECKING:
     from mpgrasp.training.dataset import GraspDataset
-    from mpgrasp.training.metrics import Verdict
+    from mpgrasp.training.metrics import LabelMatch
     from mpgrasp.training.trainer import Trainer
 
 METRICS = ("rectangle", "hit")
@@ -118,12 +118,12 @@ def train(trainer: Trainer, epochs: int, images: np.ndarray) -> dict[str, Any]:
     return {"parameters": trainer.parameters, "minutes": round(minutes, 2), "curve": curve, **answers}
 
 
-def judged(trainer: Trainer, images: np.ndarray) -> list[Verdict]:
+def judged(trainer: Trainer, images: np.ndarray) -> list[LabelMatch]:
     """Verdicts on held-out images, of the running average of the weights."""
     import torch
 
     from mpgrasp.detectors.network_detector import postprocess
-    from mpgrasp.training.metrics import judge
+    from mpgrasp.training.metrics import match_labels
 
     network = copy.deepcopy(trainer.network)
     network.load_state_dict(trainer.average)
@@ -136,11 +136,11 @@ def judged(trainer: Trainer, images: np.ndarray) -> list[Verdict]:
             heads = torch.cat(network(on_device), dim=1).float().cpu().numpy()
         for i, of_image in zip(chunk.tolist(), heads, strict=True):
             truth = trainer.validation.sample(i).resized(trainer.config.input.size)
-            verdicts.append(judge(*postprocess(of_image, trainer.weights.width_px), truth))
+            verdicts.append(match_labels(*postprocess(of_image, trainer.weights.width_px), truth))
     return verdicts
 
 
-def _answers(verdicts: Sequence[Verdict]) -> dict[str, list[bool]]:
+def _answers(verdicts: Sequence[LabelMatch]) -> dict[str, list[bool]]:
     return {metric: [bool(getattr(v, metric)) for v in verdicts] for metric in METRICS}
 
 

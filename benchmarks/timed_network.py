@@ -67,14 +67,14 @@ def weights_for(name: str) -> tuple[NetworkWeights, bool]:
     """
     from mpgrasp.detectors.networks.dhrnet import AUTHORS
     from mpgrasp.detectors.networks.input import NetworkInput
-    from mpgrasp.detectors.networks.registry import INPUT_SIZE, build_network
+    from mpgrasp.detectors.networks.registry import build_network, declaration
     from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
 
     if name != WIDE and default_weights(name).is_file():
         return load_weights(name), True
     key, settings = ("dhrnet", AUTHORS) if name == WIDE else (name, {})
     network = build_network(key, settings)
-    image = NetworkInput(size=INPUT_SIZE[key]) if key in INPUT_SIZE else NetworkInput()
+    image = NetworkInput(size=declaration(key).input_size)
     _settle(network, image)
     return NetworkWeights(name=key, network=network, settings=settings, input=image), False
 

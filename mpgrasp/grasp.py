@@ -29,8 +29,19 @@ from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, invert, looking_down, transform_points, wrap_half_pi
 
-JAW = 0.02
-"""Width of the Panda's finger pads across the closing direction [m]."""
+RECTANGLE_JAW = 0.02
+"""Nominal width of the jaws in grasp rectangles, across the closing direction [m].
+
+A convention of annotation: rectangles are compared by their overlap, so all of them must have the same jaws.
+It is not the width of the hand's pads, which is `robot.hand.FINGER_WIDTH`: with that one every overlap would
+be another number.
+"""
+PEAK_QUALITY = 0.34
+"""A quality map has a peak, exist_peak() of Algorithm 1, where its `peak_height` exceeds this.
+
+Chosen by Youden's J over the shipped detectors' grasps in held-out scenes (benchmarks/held_out.py,
+"together": 0.32 to 0.44); it lies within each detector's own interval.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +58,7 @@ class Grasp:
     """Chance of success as the detector sees it, in [0, 1]."""
 
     def T_world_grasp(self) -> FloatArray:
-        """Pose (4, 4) of the grasp frame."""
+        """Return the pose (4, 4) of the grasp frame."""
         # looking_down(yaw) has its y axis at heading yaw - pi/2
         return looking_down(self.position, self.angle + np.pi / 2)
 
@@ -81,28 +92,17 @@ class GraspMap:
                 )
 
     def world_points(self) -> FloatArray:
-        """World points (H, W, 3) [m] of all pixels (eq. 3)."""
+        """Return world points (H, W, 3) [m] of all pixels (eq. 3)."""
         v, u = np.mgrid[: self.intrinsics.height, : self.intrinsics.width]
         camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
         return transform_points(self.T_world_camera, camera)
 
-    def world_angle(self) -> FloatArray:
-        """Closing directions (H, W) about world z [rad] (eq. 3), for a camera that looks down."""
-        return wrap_half_pi(image_to_world_angle(self.angle, self.T_world_camera))
-
     def world_width(self) -> FloatArray:
-        """Openings (H, W) [m] at each pixel's depth (eq. 3)."""
+        """Return openings (H, W) [m] at each pixel's depth (eq. 3)."""
         return self.width * self.depth / self.intrinsics.fx
 
-    def grasp_of(self, rectangle: GraspRectangle) -> Grasp:
-        """The grasp in the world that a rectangle of this image stands for, at the nearest pixel's depth."""
-        rows, cols = self.depth.shape
-        row = int(np.clip(np.rint(rectangle.v), 0, rows - 1))
-        col = int(np.clip(np.rint(rectangle.u), 0, cols - 1))
-        return self._grasp(rectangle, row, col)
-
-    def rectangle_of(self, grasp: Grasp, jaw: float = JAW) -> GraspRectangle:
-        """The rectangle that a grasp in the world, with fingers `jaw` wide [m], covers in this image."""
+    def rectangle_of(self, grasp: Grasp) -> GraspRectangle:
+        """Return the rectangle of a grasp in this image, with jaws `RECTANGLE_JAW` wide."""
         camera = transform_points(invert(self.T_world_camera), np.asarray(grasp.position, float))
         u, v = self.intrinsics.project(camera)
         px_per_metre = self.intrinsics.fx / float(camera[2])
@@ -111,38 +111,30 @@ class GraspMap:
             v=float(v),
             angle=float(world_to_image_angle(grasp.angle, self.T_world_camera)),
             width_px=grasp.width * px_per_metre,
-            jaw_px=jaw * px_per_metre,
+            jaw_px=RECTANGLE_JAW * px_per_metre,
         )
 
     def grasp_at(self, row: int, col: int) -> Grasp:
-        """The grasp of one pixel in the world (eq. 3)."""
-        rectangle = GraspRectangle(
-            u=float(col),
-            v=float(row),
-            angle=float(self.angle[row, col]),
-            width_px=float(self.width[row, col]),
-            jaw_px=0.0,
-        )
-        return self._grasp(rectangle, row, col)
-
-    def _grasp(self, rectangle: GraspRectangle, row: int, col: int) -> Grasp:
+        """Return the grasp of one pixel in the world (eq. 3)."""
         z = float(self.depth[row, col])
         k = self.intrinsics
-        camera = k.deproject(np.array(rectangle.u), np.array(rectangle.v), np.array(z))
+        camera = k.deproject(np.array(float(col)), np.array(float(row)), np.array(z))
+        angle = image_to_world_angle(float(self.angle[row, col]), self.T_world_camera)
         return Grasp(
             position=transform_points(self.T_world_camera, camera),
-            angle=float(wrap_half_pi(image_to_world_angle(rectangle.angle, self.T_world_camera))),
-            width=rectangle.width_px * z / k.fx,
+            angle=float(wrap_half_pi(angle)),
+            width=float(self.width[row, col]) * z / k.fx,
             quality=float(self.quality[row, col]),
         )
 
 
 def image_to_world_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
-    """Heading in the world's xy plane [rad] of image directions at `angle` [rad], any shape."""
+    """Return the heading in the world's xy plane [rad] of image directions at `angle` [rad], any shape."""
     # (du, dv) = (cos, -sin) is the camera-frame direction (cos, -sin, 0)
     c, s = np.cos(angle), np.sin(angle)
     R = T_world_camera[:3, :3]
-    return np.arctan2(c * R[1, 0] - s * R[1, 1], c * R[0, 0] - s * R[0, 1])
+    heading: FloatArray = np.arctan2(c * R[1, 0] - s * R[1, 1], c * R[0, 0] - s * R[0, 1])
+    return heading
 
 
 def world_to_image_angle(angle: ArrayLike, T_world_camera: FloatArray) -> FloatArray:
@@ -168,33 +160,16 @@ class GraspRectangle:
     jaw_px: float
     """Width of the fingers, across the closing direction [px]."""
 
-    @classmethod
-    def from_corners(cls, corners: FloatArray) -> GraspRectangle:
-        """From corners (4, 2) as (u, v) whose first edge runs along the closing direction [px]."""
-        corners = np.asarray(corners, float)
-        if corners.shape != (4, 2) or not np.isfinite(corners).all():
-            raise ConfigError(
-                "unusable grasp rectangle", got=corners.tolist(), allowed="4 finite corners (u, v)"
-            )
-        edge, side = corners[1] - corners[0], corners[2] - corners[1]
-        u, v = corners.mean(axis=0)
-        return cls(
-            u=float(u),
-            v=float(v),
-            angle=float(wrap_half_pi(np.arctan2(-edge[1], edge[0]))),
-            width_px=float(np.hypot(*edge)),
-            jaw_px=float(np.hypot(*side)),
-        )
-
     def corners(self) -> FloatArray:
-        """Corners (4, 2) as (u, v) [px]; the first edge runs along the closing direction."""
+        """Return corners (4, 2) as (u, v) [px]; the first edge runs along the closing direction."""
         along = np.array([np.cos(self.angle), -np.sin(self.angle)]) * self.width_px / 2
         across = np.array([np.sin(self.angle), np.cos(self.angle)]) * self.jaw_px / 2
         corners = np.array([-along - across, along - across, along + across, -along + across])
-        return corners + np.array([self.u, self.v])
+        result: FloatArray = corners + np.array([self.u, self.v])
+        return result
 
     def iou(self, other: GraspRectangle) -> float:
-        """Area shared with `other` over the area of both together, in [0, 1]."""
+        """Return the area shared with `other` over the area of both together, in [0, 1]."""
         mine, theirs = self.width_px * self.jaw_px, other.width_px * other.jaw_px
         if min(mine, theirs) <= 0:
             return 0.0
@@ -207,7 +182,7 @@ class GraspRectangle:
 
 
 def best_pixel(quality: FloatArray) -> tuple[int, int]:
-    """(row, col) of the highest quality (H, W); of a flat top, the pixel that lies deepest inside.
+    """Return (row, col) of the highest quality (H, W); of a flat top, the pixel that lies deepest inside.
 
     NaN and -inf never win; where nothing is finite the answer is (0, 0).
     """
@@ -225,7 +200,7 @@ def best_pixel(quality: FloatArray) -> tuple[int, int]:
 def peaks(
     quality: FloatArray, *, threshold: float = 0.1, distance: float = 10.0, count: int | None = None
 ) -> NDArray[np.intp]:
-    """Local maxima (n, 2) as (row, col), best first, at least `distance` [px] apart and above `threshold`.
+    """Return local maxima (n, 2) as (row, col), best first, `distance` [px] or more apart, above `threshold`.
 
     Of maxima that are closer than that, the better one stays (non-maximum suppression).
     """
@@ -245,7 +220,7 @@ def peaks(
 
 
 def peak_height(quality: FloatArray) -> float:
-    """Highest 3x3 mean of a quality map (H, W): what exist_peak() holds against its threshold."""
+    """Return the highest 3x3 mean of a quality map (H, W), for exist_peak() to compare with a threshold."""
     finite = quality if np.isfinite(quality).all() else np.nan_to_num(quality)
     image = finite.astype(np.float32, copy=False)
     return float(cv2.blur(image, (3, 3), borderType=cv2.BORDER_REPLICATE).max())

@@ -204,7 +204,8 @@ def test_importing_the_environment_loads_no_torch() -> None:
 @pytest.mark.parametrize(
     "words",
     [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "report", "--help"),
-     ("detectors", "--help"), ("scene", "--help")],
+     ("detectors", "--help"), ("scene", "--help"), ("training", "--help"),
+     ("training", "generate", "--help"), ("training", "train", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
     module = f"mpgrasp.{words[0]}"
@@ -219,3 +220,10 @@ def test_every_name_that_a_package_hands_on_is_there(package: Path) -> None:
     assert module.__all__
     for attribute in module.__all__:
         assert getattr(module, attribute) is not None
+
+
+@pytest.mark.skipif(not (PACKAGE.parent / ".git").exists(), reason="no checkout")
+def test_the_ignore_rules_hide_no_module() -> None:
+    """A wheel leaves out what git ignores, even where it is tracked."""
+    command = ["git", "check-ignore", "--no-index", *(str(path) for path in SOURCES)]
+    assert subprocess.run(command, capture_output=True, text=True, cwd=PACKAGE.parent).stdout == ""

@@ -53,7 +53,7 @@ def flat_map(
 def blob_map(
     blob: Blob, T_world_camera: FloatArray, rng: np.random.Generator | None, *, noise: float = 0.03
 ) -> GraspMap:
-    """What a detector would make of the blob, worked out here without any of mpgrasp's own geometry."""
+    """Return a detector's map of the blob, worked out here without any of mpgrasp's own geometry."""
     T, k = T_world_camera, INTRINSICS
     height = float(T[2, 3])
     a = (np.arange(k.width) - k.cx) / k.fx * height
@@ -77,7 +77,7 @@ def blob_map(
 
 @dataclass(frozen=True)
 class Flight:
-    """What came of a reach: camera xy (n, 2), commands, and the last tcp pose."""
+    """Record of a reach: camera xy (n, 2), commands, and the last tcp pose."""
 
     camera: FloatArray
     commands: list[Command]

@@ -16,11 +16,11 @@ CONTROLLERS: dict[str, str] = {
     "mvp": "mpgrasp.controllers.mvp:Mvp",
     "open_loop": "mpgrasp.controllers.open_loop:OpenLoop",
 }
-"""Where each controller is; loaded when it is made."""
+"""Import path of each controller; it is loaded when it is made."""
 
 
 def make_controller(name: str, config: MppcConfig | None = None) -> Controller:
-    """A controller by its name, with the settings of the preset "paper" unless others are given.
+    """Return a controller by its name, with the settings of the preset "paper" unless others are given.
 
     Raises:
         ConfigError: there is no controller of that name.
@@ -28,4 +28,5 @@ def make_controller(name: str, config: MppcConfig | None = None) -> Controller:
     if name not in CONTROLLERS:
         raise ConfigError("unknown controller", got=name, allowed=CONTROLLERS)
     module, _, attribute = CONTROLLERS[name].partition(":")
-    return getattr(import_module(module), attribute)(config)
+    made: Controller = getattr(import_module(module), attribute)(config)
+    return made

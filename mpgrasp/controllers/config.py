@@ -9,6 +9,8 @@ import numpy as np
 from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, GridConfig
 from mpgrasp.controllers.information import Border
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.grasp import PEAK_QUALITY
+from mpgrasp.robot import hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +25,8 @@ class MppcConfig:
     """Exploration cost [nat/m], "varied" in Table I. On a grid of 0.68 m much stays unseen, and the 4/3 of
     published code (0.2 nat for every 0.15 m, on 0.34 m) lets that outweigh an object in plain view."""
     border: Border = "nothing"
-    """What information gain finds beyond the grid's border. "nothing" is eq. 11 as printed; with "mirror"
-    the arm drifts farther when it sees nothing, on the 0.68 m grid to the end of its reach."""
+    """Entropy beyond the grid's border, as information gain counts it. "nothing" is eq. 11 as printed; with
+    "mirror" the arm drifts farther when it sees nothing, on the 0.68 m grid to the end of its reach."""
     v_z: float = 0.05
     """Speed of the descent [m/s]."""
     v_1: float = 0.1
@@ -34,10 +36,8 @@ class MppcConfig:
     distance on, in proportion below it [m]."""
     alpha: float = 0.2
     """Attenuation of the horizontal velocity while the quality map has no peak; MP-PC only."""
-    peak_threshold: float = 0.34
-    """There is a peak where the 3x3 mean of the quality exceeds this; MP-PC only. Chosen by Youden's J over
-    the shipped detectors' grasps in held-out scenes (benchmarks/held_out.py, "together": 0.32 to 0.44); it
-    lies within each detector's own interval."""
+    peak_threshold: float = PEAK_QUALITY
+    """There is a peak where the 3x3 mean of the quality exceeds this; MP-PC only."""
     z_max: float = 0.50
     """Height of the tcp where the reach begins [m]."""
     z_min: float = 0.175
@@ -52,7 +52,7 @@ class MppcConfig:
     """Heading of the tcp's x axis in the arm's home posture [rad]."""
     yaw_range: float = np.pi / 2
     """The hand stays within this of the home heading, well within the range of joint 7 [rad]."""
-    gripper_open: float = 0.08
+    gripper_open: float = hand.GRIPPER_MAX_WIDTH
     """Opening of the gripper during the reach [m]."""
 
     def __post_init__(self) -> None:
@@ -87,7 +87,7 @@ PRESETS: dict[str, MppcConfig] = {
 
 
 def preset(name: str) -> MppcConfig:
-    """The named settings.
+    """Return the named settings.
 
     Raises:
         ConfigError: there is no such preset.

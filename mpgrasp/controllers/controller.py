@@ -1,4 +1,4 @@
-"""What every reaching controller offers: a view in, a Cartesian velocity out, and in the end a grasp."""
+"""The protocol of every reaching controller: a view in, a Cartesian velocity out, and in the end a grasp."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mpgrasp.grasp import Grasp, GraspMap
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observation:
-    """What the controller is told on a control tick."""
+    """Input of a controller on a control tick."""
 
     time: float
     """Simulated time since the episode began [s]."""
@@ -24,7 +24,7 @@ class Observation:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Command:
-    """What the robot shall do until the next tick."""
+    """Output of a controller: the robot's motion until the next tick."""
 
     twist: FloatArray
     """(6,) velocity of the tcp in world axes: linear [m/s], then angular [rad/s]."""
@@ -44,13 +44,13 @@ class Controller(Protocol):
         ...
 
     def update(self, observation: Observation) -> Command:
-        """Fuse one view and say how to move."""
+        """Fuse one view and return the next motion."""
         ...
 
     def final_grasp(self) -> Grasp | None:
-        """The grasp to execute, or None where no grasp was seen."""
+        """Return the grasp to execute, or None where no grasp was seen."""
         ...
 
     def diagnostics(self) -> Mapping[str, FloatArray | float | bool]:
-        """What the controller looked at on the last tick, for recordings: grids (ny, nx) and scalars."""
+        """Return grids (ny, nx) and scalars that the controller looked at last, for recordings."""
         ...

@@ -1,4 +1,4 @@
-"""How uncertain each cell is, what a view from above it would tell, and what that costs (eq. 10-13)."""
+"""Uncertainty of each cell, information gain of a view from above it, and cost of that view (eq. 10-13)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.geometry import FloatArray
 
 Border = Literal["nothing", "mirror"]
-"""What lies beyond the grid: "nothing" to be learnt (eq. 11 sums over cells), or the grid's mirror image,
+"""Entropy beyond the grid: "nothing" to be learnt (eq. 11 sums over cells), or the grid's mirror image,
 as in published multi-view picking code, which takes away the pull towards the middle of the grid."""
 
 
 def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
-    """Entropy (...) [nat] of quality histograms (..., n_q), eq. 10; `prior` is added to every bin.
+    """Return the entropy (...) [nat] of quality histograms (..., n_q), eq. 10; `prior` is added to all bins.
 
     An empty histogram is maximally uncertain, log n_q: the limit of a vanishing uniform prior, where
     eq. 10 is 0/0.
@@ -29,18 +29,20 @@ def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
     logs = np.log(p, out=np.zeros(p.shape, np.result_type(p, np.float32)), where=True if prior > 0 else p > 0)
     safe = np.where(total > 0, total, 1)
     entropy = np.log(safe) - np.einsum("...q,...q->...", p, logs) / safe
-    return np.where(total > 0, np.maximum(entropy, 0.0), np.log(p.shape[-1]))
+    result: FloatArray = np.where(total > 0, np.maximum(entropy, 0.0), np.log(p.shape[-1]))
+    return result
 
 
 def grid_entropy(grid: GridMap, prior_count: float = 1.0) -> FloatArray:
-    """Entropy (ny, nx) [nat] of every cell with `prior_count` per angle and quality bin, hence N_theta of
-    it per quality bin; log N_q, the maximum, where nothing was seen.
+    """Return the entropy (ny, nx) [nat] of every cell; log N_q, the maximum, where nothing was seen.
+
+    `prior_count` is counted per angle and quality bin, hence N_theta times per quality bin.
     """
     return cell_entropy(grid.quality_counts, prior_count * grid.config.n_angle)
 
 
 def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothing") -> FloatArray:
-    """Expected gain (ny, nx) [nat] of a view from above each cell, eq. 11.
+    """Return the expected gain (ny, nx) [nat] of a view from above each cell, eq. 11.
 
     The weights P are a Gaussian of `sigma` cells, cut at 3 sigma, that sums to one: the gain is the mean
     entropy under the footprint, whatever its size, so that the exploration cost weighs the same at every
@@ -61,7 +63,7 @@ def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothin
 
 
 def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: float) -> FloatArray:
-    """Cost r (ny, nx) [m] of a viewpoint above each cell, eq. 13.
+    """Return the cost r (ny, nx) [m] of a viewpoint above each cell, eq. 13.
 
     The distance to the best cell at world (x, y) `centre`, times one minus the height fraction
     (t_z - z_min) / (z_max - z_min). Zero where there is no best cell yet.
@@ -70,9 +72,10 @@ def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: 
         return np.zeros(grid.shape)
     x, y = grid.axes()
     distance = np.hypot(x - centre[0], (y - centre[1])[:, None])  # (ny, nx)
-    return distance * (1.0 - np.clip(height_fraction, 0.0, 1.0))
+    cost: FloatArray = distance * (1.0 - np.clip(height_fraction, 0.0, 1.0))
+    return cost
 
 
 def utility(gain: FloatArray, cost: FloatArray, gamma: float) -> FloatArray:
-    """Utility (ny, nx) [nat] of every viewpoint, eq. 12, with `gamma` in nat per metre."""
+    """Return the utility (ny, nx) [nat] of every viewpoint, eq. 12, with `gamma` in nat per metre."""
     return np.asarray(gain, np.float32) - gamma * cost

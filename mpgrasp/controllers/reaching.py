@@ -1,4 +1,4 @@
-"""What MP-PC and its baseline MVP share: fuse a view, find the best viewpoint near by, go there and down."""
+"""Reaching of MP-PC and its baseline MVP: fuse a view, find the best viewpoint near by, go there and down."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from mpgrasp.grasp import Grasp, GraspMap, peak_height
 _TIE = 1e-3
 """Utilities closer to the best than this fraction of the range in the window are equally good."""
 _TIE_NAT = 1e-6
-"""And so are utilities closer than this: single precision makes no better difference [nat]."""
+"""Utilities closer than this are equally good too: single precision tells no more apart [nat]."""
 _YAW_SLACK = np.deg2rad(15)
-"""How far beyond the yaw range a grasp may lie before the hand turns the other way to meet it [rad]."""
+"""Angle beyond the yaw range at which a grasp makes the hand turn the other way to meet it [rad]."""
 
 
 class ReachingController(ABC):
@@ -80,15 +80,15 @@ class ReachingController(ABC):
 
     @abstractmethod
     def _attenuation(self, peak: bool) -> float:
-        """Factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
+        """Return the factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
 
     def _evaluate(self, grasp_map: GraspMap, height: float) -> FloatArray:
-        """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
+        """Return the utility (ny, nx) of every viewpoint at the present height, eq. 12."""
         c, k = self.config, grasp_map.intrinsics
         # a sixth of the field of view where it meets the table, in cells; mean of both image sides
-        view = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
+        footprint = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
         entropy = grid_entropy(self.grid, c.prior_count)
-        gain = information_gain(entropy, max(view, 0.0) / 6 / c.grid.cell, c.border)
+        gain = information_gain(entropy, max(footprint, 0.0) / 6 / c.grid.cell, c.border)
         best = self.grid.best_cell()
         centre = None if best is None else self.grid.position(best)
         cost = exploration_cost(self.grid, centre, (height - c.z_min) / (c.z_max - c.z_min))
@@ -102,7 +102,7 @@ class ReachingController(ABC):
         return result
 
     def _best_viewpoint(self, values: FloatArray, camera: FloatArray) -> FloatArray:
-        """World (x, y) of the best utility within the window around the camera's (x, y).
+        """Return world (x, y) of the best utility within the window around the camera's (x, y).
 
         Where several are equally good, the one farthest along the episode's random heading, so that the
         choice is a direction and not the order of the array. Off the grid, its nearest cell.
@@ -118,7 +118,7 @@ class ReachingController(ABC):
         return self.grid.position((int(row), int(col)))
 
     def _yaw_rate(self, angle: float, T_world_tcp: FloatArray) -> float:
-        """Yaw rate [rad/s] towards closing direction `angle`, by the smaller turn that stays in range."""
+        """Return the yaw rate [rad/s] towards direction `angle`, by the smaller turn that stays in range."""
         c = self.config
         closing = np.arctan2(T_world_tcp[1, 1], T_world_tcp[0, 1])
         yaw = float(wrap_pi(np.arctan2(T_world_tcp[1, 0], T_world_tcp[0, 0]) - c.home_yaw))

@@ -11,11 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.detectors.networks.registry import RUNTIMES
+from mpgrasp.detectors.networks.registry import NETWORKS
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
-
-__all__ = ["DETECTORS", "RUNTIMES", "GraspDetector", "make_detector"]
-
 
 _Maker = Callable[[Path | str | None, str], GraspDetector]
 
@@ -38,13 +36,14 @@ def _oracle(weights: Path | str | None, runtime: str) -> GraspDetector:
 
 
 DETECTORS: dict[str, _Maker] = {
-    **{n: _network(n) for n in ("dhrnet", "tfgrasp", "ggcnn2", "ggcnn", "fcn", "fcn_residual", "unet")},
+    **{name: _network(name) for name in NETWORKS},
     "oracle": _oracle,
 }
+"""Every network of the registry, and the oracle; torch is loaded when one is made."""
 
 
 def make_detector(name: str, weights: Path | str | None = None, runtime: str = "auto") -> GraspDetector:
-    """The detector of that name; `weights` replaces the shipped file, `runtime` says what computes a network.
+    """Return the detector of that name; `weights` replaces the shipped file, `runtime` computes a network.
 
     Raises:
         ConfigError: there is no such detector or runtime, or it takes no weights.

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from mpgrasp.command_line import Parser
-from mpgrasp.detectors.networks.registry import RUNTIMES
+from mpgrasp.detectors.runtimes import RUNTIMES
 
 _RUNTIMES = "|".join(RUNTIMES)
 _EPILOG = """\
@@ -25,7 +25,7 @@ exit code: 0 done, 1 the runtime finds other grasps (check), 2 unusable input, 1
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
+    """Return the parser of the command line; needs neither torch nor OpenGL nor MuJoCo."""
     parser = Parser(
         prog="python -m mpgrasp.detectors",
         description="See what grasp detectors see, how exact they are, and what is known of their weights.",

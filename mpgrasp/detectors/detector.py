@@ -1,4 +1,4 @@
-"""What every grasp detector offers: a depth frame in, a grasp map out."""
+"""The protocol of every grasp detector: a depth frame in, a grasp map out."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class GraspDetector(Protocol):
         ...
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame; quality is zero everywhere where the image says nothing."""
+        """Return the grasp map of the frame; quality is zero everywhere where the image says nothing."""
         ...
 
 
 def reads_truth(detector: GraspDetector) -> bool:
-    """Whether the detector declares, by `reads_truth = True`, that it is told the scene's true shape.
+    """True if the detector declares, by `reads_truth = True`, that it is told the scene's true shape.
 
     The benchmark writes it into run.json: such a detector is a ceiling, not a competitor.
     """
@@ -32,14 +32,14 @@ def reads_truth(detector: GraspDetector) -> bool:
 
 
 def reads_colour(detector: GraspDetector) -> bool:
-    """Whether the detector declares, by `reads_colour = True`, that its frames must have colour."""
+    """True if the detector declares, by `reads_colour = True`, that its frames must have colour."""
     return bool(getattr(detector, "reads_colour", False))
 
 
 def prepare(detector: GraspDetector) -> str | None:
-    """Have a detector that compiles something do it now; what it took, as a line for people, if it does.
+    """Let a detector that compiles something do it now, and return a line that says what it took.
 
-    Such a detector offers `warm_up()`, which returns seconds, and `readiness`, the line.
+    Such a detector offers `warm_up()`, which returns seconds, and `readiness`, the line. None of all others.
     """
     if not hasattr(detector, "warm_up"):
         return None

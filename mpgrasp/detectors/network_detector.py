@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.depth import CROP, DepthFrame, inpaint
+from mpgrasp.detectors.central_square import central_square, empty_map, says_something
 from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
-from mpgrasp.detectors.square_view import empty_map, says_something, square_view
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkDetectorConfig:
-    """What happens around the network."""
+    """Settings of the image processing before and after the network."""
 
     crop: int = CROP
     """Side of the central square that the network sees [px]; smaller images are used as far as they go."""
@@ -55,7 +55,7 @@ class NetworkDetector:
 
     Args:
         weights: the network.
-        config: what happens around it.
+        config: image processing before and after it.
         runtime: what computes it: "auto", "torch" or "openvino", or something that is ready to.
 
     Raises:
@@ -85,7 +85,7 @@ class NetworkDetector:
         config: NetworkDetectorConfig | None = None,
         runtime: str | Runtime = "auto",
     ) -> NetworkDetector:
-        """The detector of that name with weights from a file, by default the shipped ones.
+        """Return the detector of that name with weights from a file, by default the shipped ones.
 
         Raises:
             ConfigError: unknown runtime, or OpenVINO where there is none.
@@ -100,17 +100,17 @@ class NetworkDetector:
 
     @property
     def runtime(self) -> str:
-        """What computes the network, in two or three words: "openvino bf16", "torch f32, cuda"."""
+        """Runtime that computes the network, in two or three words: "openvino bf16", "torch f32, cuda"."""
         return self._name if self._runtime is None else self._runtime.name
 
     @property
     def device(self) -> str:
-        """Where the network is computed: "cpu" or "cuda"."""
+        """Device that computes the network: "cpu" or "cuda"."""
         return "cuda" if "cuda" in self.runtime else "cpu"
 
     @property
     def readiness(self) -> str:
-        """What is ready, and in what time it was: "dhrnet: openvino bf16, ready in 1.3 s (cached)"."""
+        """State of the runtime and time to get ready: "dhrnet: openvino bf16, ready in 1.3 s (cached)"."""
         if self._runtime is None:
             return f"{self.name}: {self.runtime}, not ready yet"
         cached = " (cached)" if self._runtime.cached else ""
@@ -135,7 +135,7 @@ class NetworkDetector:
         """Start an episode; a network knows nothing but images."""
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasp map of the frame's central square; quality is zero where image or network say nothing.
+        """Return the grasp map of the frame's central square; quality is 0 where nothing can be said.
 
         Raises:
             ConfigError: a network that reads colour got a frame without it.
@@ -145,7 +145,7 @@ class NetworkDetector:
                 f"{self.name} with {self.weights.input.modality} input reads colour, and the frame has none",
                 allowed="frames with rgb, as from WristCamera(colour=True), which needs OpenGL",
             )
-        image = square_view(frame, self.config.crop, self.weights.input.size)
+        image = central_square(frame, self.config.crop, self.weights.input.size)
         seen = says_something(frame, image)
         image = replace(image, depth=inpaint(image.depth))
         if not seen:
@@ -156,7 +156,7 @@ class NetworkDetector:
     def grasp_arrays(
         self, depth: Float32, rgb: NDArray[np.uint8] | None = None
     ) -> tuple[Float32, Float32, Float32]:
-        """Quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN.
+        """Return quality, angle [rad] and width [px], each (size, size), of a depth image [m] without NaN.
 
         All are zero where the network's output is not finite: broken weights must not choose a grasp.
         """
@@ -167,7 +167,7 @@ class NetworkDetector:
         return postprocess(heads, self.weights.width_px, self.config)
 
     def _heads(self, image: Float32) -> Float32:
-        """Raw heads (4, size, size) for an input (channels, size, size)."""
+        """Return raw heads (4, size, size) for an input (channels, size, size)."""
         self.warm_up()
         assert self._runtime is not None
         return self._runtime(image)
@@ -176,7 +176,7 @@ class NetworkDetector:
 def postprocess(
     heads: Float32, width_px: float, config: NetworkDetectorConfig | None = None
 ) -> tuple[Float32, Float32, Float32]:
-    """Quality in [0, 1], angle [rad] and width [px], each (H, W), from the raw heads (4, H, W)."""
+    """Return quality in [0, 1], angle [rad] and width [px], each (H, W), from the raw heads (4, H, W)."""
     c = config or NetworkDetectorConfig()
     pos, cos, sin, width = heads
     quality = np.clip(_smooth(pos, c.quality_sigma), 0.0, 1.0)

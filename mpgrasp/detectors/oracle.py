@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from mpgrasp.depth import DepthFrame, inpaint
-from mpgrasp.detectors.antipodal.analysis import HandGeometry, WorldGrasps, antipodal_grasps
-from mpgrasp.detectors.square_view import empty_map, says_something, square_view
+from mpgrasp.detectors.antipodal.analysis import WorldGrasps, antipodal_grasps
+from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.detectors.central_square import central_square, empty_map, says_something
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, world_to_image_angle
@@ -46,27 +47,27 @@ class OracleDetector:
         self._grasps = antipodal_grasps(truth, self.hand)
 
     def predict(self, frame: DepthFrame) -> GraspMap:
-        """Grasps of the frame's central crop; pixels without depth have none.
+        """Return grasps of the frame's central square; pixels without depth have none.
 
         Raises:
             ConfigError: before the first `reset`.
         """
         if self._grasps is None:
             raise ConfigError("the oracle has no scene", allowed="reset(truth) before predict")
-        image = square_view(frame)
+        image = central_square(frame)
         if not says_something(frame, image):
             return empty_map(replace(image, depth=inpaint(image.depth)))
-        return view_grasps(self._grasps, image, known=np.isfinite(image.depth), depth=inpaint(image.depth))
+        return grasps_in_view(self._grasps, image, known=np.isfinite(image.depth), depth=inpaint(image.depth))
 
 
-def view_grasps(
+def grasps_in_view(
     grasps: WorldGrasps,
     image: DepthFrame,
     *,
     known: np.ndarray | None = None,
     depth: FloatArray | None = None,
 ) -> GraspMap:
-    """World grasps as seen in an image: nearest cell under every pixel, nothing interpolated.
+    """Return world grasps as seen in an image: nearest cell under every pixel, nothing interpolated.
 
     Args:
         grasps: of the scene.

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpgrasp.controllers.config import MppcConfig
 from mpgrasp.geometry import FloatArray
-from mpgrasp.grasp import GraspMap, peak_height
+from mpgrasp.grasp import PEAK_QUALITY, GraspMap, peak_height
 from mpgrasp.motion.arm_driver import ArmDriver
 
-DETECTION_QUALITY = MppcConfig().peak_threshold
-"""Peak of the quality map above which something counts as detected, whatever the controller makes of it."""
+DETECTION_QUALITY = PEAK_QUALITY
+"""Peak of the quality map above which something counts as detected, whatever a controller's threshold is."""
 CUTOFF = 10.0
 """Highest frequency that the arc runs to [Hz]."""
 AMPLITUDE = 0.05

@@ -1,0 +1,1 @@
+"""Training of networks, and the data that they are trained on."""

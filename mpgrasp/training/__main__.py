@@ -9,7 +9,7 @@ from mpgrasp.command_line import Parser, run_command
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a subcommand; returns the exit code, 2 for input that cannot be used."""
+    """Run a subcommand and return its exit code, 2 for input that cannot be used."""
     return run_command(lambda: _run(argv))
 
 

@@ -43,20 +43,20 @@ class Sample:
     """One image with dense labels, all (H, W)."""
 
     depth: NDArray[np.float32]
-    """[m], holes filled."""
+    """Depth, holes filled [m]."""
     quality: NDArray[np.float32]
-    """[0, 1]"""
+    """Label: worth of the grasp, in [0, 1]."""
     angle: NDArray[np.float32]
-    """[rad]"""
+    """Label: closing direction in the image [rad]."""
     width: NDArray[np.float32]
-    """[px]"""
+    """Label: opening [px]."""
     valid: NDArray[np.bool_]
     """False where a turned image has no data."""
     rgb: NDArray[np.uint8] | None = None
     """(H, W, 3), where colour was asked for."""
 
     def resized(self, size: int) -> Sample:
-        """The sample at `size` px; every pixel takes the old one under its centre, widths are scaled."""
+        """Return the sample at `size` px: a pixel takes the old one under its centre, widths are scaled."""
         rows, cols = self.depth.shape
         if rows == cols == size:
             return self
@@ -72,7 +72,7 @@ class Sample:
 
 
 def augment(sample: Sample, config: Augmentation, rng: np.random.Generator) -> Sample:
-    """The sample flipped, turned, zoomed, moved in depth and recoloured at random; labels go along.
+    """Flip, turn, zoom, move in depth and recolour the sample at random; labels go along.
 
     The same draws are made with and without colour, so that modalities are trained on the same images.
     """
@@ -100,7 +100,7 @@ def augment(sample: Sample, config: Augmentation, rng: np.random.Generator) -> S
 def _recoloured(
     rgb: NDArray[np.uint8], config: Augmentation, light: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """Colours (H, W, 3) with other contrast, brightness and cast, as `light` (5,) in [-1, 1] says."""
+    """Return colours (H, W, 3) of other contrast, brightness and cast, by `light` (5,) in [-1, 1]."""
     mean = float(rgb.mean())
     gain = np.exp(config.brightness * light[0] + config.cast * light[2:])  # (3,)
     spread = np.exp(config.contrast * light[1])
@@ -110,7 +110,7 @@ def _recoloured(
 
 
 def warp(sample: Sample, turn: float, zoom: float) -> Sample:
-    """The sample turned by `turn` [rad], counter-clockwise on screen, and magnified about its centre."""
+    """Return the sample turned by `turn` [rad], counter-clockwise on screen, and magnified."""
     rows, cols = sample.depth.shape
     matrix = cv2.getRotationMatrix2D(((cols - 1) / 2, (rows - 1) / 2), np.rad2deg(turn), zoom)
 

@@ -1,4 +1,4 @@
-"""Which images each training step sees, and their batches, prepared while the step before computes."""
+"""Batches of each training step, prepared while the step before computes."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Batches:
         self._width_px, self._device = width_px, device
 
     def __len__(self) -> int:
-        """Images in an epoch."""
+        """Return the number of images in an epoch."""
         return len(self._deck())
 
     def ahead(self, step: int) -> Generator[tuple[Tensor, ...], None, None]:
-        """Batches from that step on; close the iterator to stop the threads that prepare them."""
+        """Yield batches from that step on; close the iterator to stop the threads that prepare them."""
         threads = 1 if self._device.type == "cpu" else min(LOADERS, os.cpu_count() or 1)
         with ThreadPoolExecutor(threads) as loaders:
             waiting: deque[Future[tuple[Tensor, ...]]] = deque()
@@ -48,7 +48,7 @@ class Batches:
                     batch.cancel()
 
     def draw(self, step: int) -> tuple[Tensor, ...]:
-        """Image, quality, angle, width and valid of that step's batch; see losses.to_tensors."""
+        """Return image, quality, angle, width and valid of that step's batch; see losses.to_tensors."""
         rng = np.random.default_rng([self._config.seed, step])
         augmentation = self._config.augmentation
         batch = self._dataset.batch(
@@ -58,7 +58,7 @@ class Batches:
         return tensors if self._device.type == "cpu" else tuple(t.pin_memory() for t in tensors)
 
     def chosen(self, step: int) -> np.ndarray:
-        """Indices of that step's images: every epoch deals all of them, in an order of its own."""
+        """Return indices of that step's images: every epoch deals all of them, in an order of its own."""
         deck, size = self._deck(), self._config.batch
         epoch, place = np.divmod(step * size + np.arange(size), len(deck))
         dealt = [
@@ -68,7 +68,7 @@ class Batches:
         return np.concatenate(dealt)
 
     def _deck(self) -> np.ndarray:
-        """Training images; those of thin objects as often as their weight says, on average."""
+        """Return training images; those of thin objects as often as their weight says, on average."""
         images, thin = self._dataset.training, self._dataset.column("thin")
         if thin is None or self._config.thin_weight == 1:
             return images

@@ -1,4 +1,4 @@
-"""The training card: what a weights file says about how it was made."""
+"""The training card: how a weights file was made, as the file itself tells it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LICENCE = "Apache-2.0"
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingRecord:
-    """What there is to say of a training, whoever did it."""
+    """Facts of a training, whoever did it."""
 
     command: str
     """That can be typed to do it again."""
@@ -34,12 +34,12 @@ class TrainingRecord:
     device: str
     """cpu or cuda."""
     parameters: int
-    """Of the network."""
+    """Number of the network's parameters."""
     best: Mapping[str, float]
     """Validation figures of the weights that were kept."""
 
     def card(self) -> dict[str, Any]:
-        """Command, data with their verification, seed, steps, time, settings, metrics, licence."""
+        """Return command, data with their verification, seed, steps, time, settings, metrics, licence."""
         config = self.config
         return {
             "command": self.command,

@@ -34,7 +34,7 @@ def write_checkpoint(path: Path, config: TrainConfig, state: Mapping[str, Any]) 
 
 
 def read_checkpoint(path: Path, config: TrainConfig, device: torch.device) -> dict[str, Any]:
-    """What was written.
+    """Return what was written.
 
     Raises:
         WeightsError: the file is unreadable or of a run with other settings.

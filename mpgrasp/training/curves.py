@@ -18,7 +18,7 @@ PANELS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 """Title and columns of each panel of the picture."""
 SIDE = 3.4
-"""Of a panel [inch]."""
+"""Side of a panel [inch]."""
 
 
 def write_curves(table: Path, rows: Rows) -> None:

@@ -1,17 +1,7 @@
-"""Training shards in memory, and augmented batches from them.
-
-A shard is `shard_00000.npz` as `generate` writes it: `depth`, `quality`, `angle` and `width`, each
-(n, 224, 224) in the units of labels.py, `rgb` (n, 224, 224, 3), and `meta` (n, k), whose columns are the
-"meta_columns" of meta.json beside it. Colour is read only where it is asked for.
-
-Holes are filled once, when a shard is read, by the function that the detectors use. Depth stays in its 16
-bit units: half-precision floats would round to 0.25 mm, which is much for a stick of 4 mm.
-"""
+"""Training shards in memory, and augmented batches from them."""
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.depth import inpaint
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation, Sample, augment
-from mpgrasp.training.data.labels import QUALITY_UNIT, decode_angle, decode_depth, encode_depth
-from mpgrasp.training.data.shards import FORMAT
+from mpgrasp.training.data.labels import QUALITY_UNIT, decode_angle, decode_depth
+from mpgrasp.training.data.shard_reader import read_description, read_shard
 
 SCENE_COLUMN = "scene"
 """Images of one scene are either all held out or none."""
@@ -92,8 +81,8 @@ class GraspDataset:
         """Read shards that have appeared since, and return how many; earlier images keep their numbers."""
         found = [p for d in self._directories for p in sorted(d.glob("shard_*.npz")) if p not in self._paths]
         for path in found:
-            self._told[path.parent] = told = _read_description(path.parent)
-            shard = _read_shard(path, colour=self.colour)
+            self._told[path.parent] = told = read_description(path.parent)
+            shard = read_shard(path, colour=self.colour)
             columns = told["meta_columns"]
             if len(columns) != shard["meta"].shape[1]:
                 raise ConfigError(
@@ -117,7 +106,7 @@ class GraspDataset:
         return len(self._place)
 
     def column(self, name: str) -> NDArray[np.float32] | None:
-        """(n,) values of a meta column, or None where shards have no such column."""
+        """Return values (n,) of a meta column, or None where shards have no such column."""
         return self.meta[:, self.columns.index(name)] if name in self.columns else None
 
     def _scenes(self) -> NDArray[np.int64]:
@@ -126,11 +115,11 @@ class GraspDataset:
 
     @property
     def scene_count(self) -> int:
-        """How many scenes the training images show."""
+        """Number of scenes that the training images show."""
         return len(np.unique(self._scenes()[self.training]))
 
     def description(self) -> list[dict[str, object]]:
-        """For each directory its name, how many shards were read, what its meta.json tells, and the lifts."""
+        """Return each directory's name, number of shards, facts from its meta.json, and lifts."""
         about: list[dict[str, object]] = []
         for directory, meta in self._told.items():
             shards = sum(path.parent == directory for path in self._paths)
@@ -141,7 +130,7 @@ class GraspDataset:
         return about
 
     def _lifts(self, directory: Path) -> dict[str, object]:
-        """Of the simulated lifts behind the labels: (lifted, tried) by where the grasps were drawn from."""
+        """Return counts (lifted, tried) of the simulated lifts behind the labels, by source of the grasps."""
         names = self._told[directory].get("trial_columns")
         read = zip(self._paths, self._shards, strict=True)
         trials = [s["trials"] for path, s in read if path.parent == directory and "trials" in s]
@@ -157,7 +146,7 @@ class GraspDataset:
         return {"lifts": {k: [int(told["lifted"][m].sum()), int(m.sum())] for k, m in groups.items()}}
 
     def scene(self, index: int) -> tuple[int, int]:
-        """Seed and number of the scene that image `index` shows, as `make_scene` takes them.
+        """Return seed and number of the scene that image `index` shows, as `make_scene` takes them.
 
         Raises:
             ConfigError: shards that do not tell.
@@ -169,7 +158,7 @@ class GraspDataset:
         return int(self._told[directory]["seed"]), int(scenes[index])
 
     def sample(self, index: int) -> Sample:
-        """Image `index` as it is."""
+        """Return image `index` as it is."""
         shard, row = self._place[index]
         arrays = self._shards[shard]
         return Sample(
@@ -188,7 +177,7 @@ class GraspDataset:
         rng: np.random.Generator | None = None,
         augmentation: Augmentation | None = None,
     ) -> Batch:
-        """Inputs and labels of those images, augmented where there is an rng."""
+        """Return inputs and labels of those images, augmented where there is an rng."""
         samples = [self.sample(int(i)) for i in indices]
         if rng is not None:
             samples = [augment(s, augmentation or Augmentation(), rng) for s in samples]
@@ -203,49 +192,6 @@ class GraspDataset:
 
 
 def _held_out(scenes: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
-    """Which images to hold out: a hash of the scene decides, so that it stays when more shards come."""
+    """True for images to hold out: a hash of the scene decides, so that it stays when more shards come."""
     hashed = (scenes.astype(np.uint64) * np.uint64(2654435761)) % np.uint64(2**32)
     return hashed / 2**32 < share
-
-
-def _read_description(directory: Path) -> dict[str, Any]:
-    path = directory / "meta.json"
-    try:
-        told = dict(json.loads(path.read_text(encoding="utf-8")))
-        if told.get("format") != FORMAT:
-            raise ConfigError(
-                f"shards of another format in {directory.name}",
-                got=told.get("format", "none"),
-                allowed=f"{FORMAT}; generate them anew",
-            )
-        return told | {"meta_columns": [str(name) for name in told["meta_columns"]]}
-    except ConfigError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(f"unreadable description of shards: {error!r}", got=str(path)) from error
-
-
-def _read_shard(path: Path, *, colour: bool) -> dict[str, np.ndarray]:
-    keys = ["depth", "quality", "angle", "width", "meta", *(["rgb"] if colour else [])]
-    try:
-        with np.load(path) as file:
-            if colour and "rgb" not in file:
-                raise ConfigError(
-                    "shard without colour", got=str(path), allowed="input d, or data with colour"
-                )
-            shard = {key: file[key] for key in (*keys, "trials") if key in keys or key in file}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise ConfigError(f"unreadable shard: {error}", got=str(path)) from error
-    shape = shard["depth"].shape
-    if len(shape) != 3 or any(shard[k].shape != shape for k in ("quality", "angle", "width")):
-        raise ConfigError("shard with maps of different sizes", got=str(path), allowed="all (n, H, W)")
-    if colour and (shard["rgb"].shape != (*shape, 3) or shard["rgb"].dtype != np.uint8):
-        raise ConfigError("shard with unusable colour", got=str(path), allowed="uint8 (n, H, W, 3)")
-    if shard["depth"].dtype != np.uint16 or len(shard["meta"]) != shape[0]:
-        raise ConfigError(
-            "shard of another format", got=str(path), allowed="uint16 depth, one meta row an image"
-        )
-    holes = np.flatnonzero((shard["depth"] == 0).any(axis=(1, 2)))
-    for k in holes:
-        shard["depth"][k] = encode_depth(inpaint(decode_depth(shard["depth"][k])))
-    return shard

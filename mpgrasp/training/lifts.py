@@ -1,4 +1,4 @@
-"""What a network's best grasps are worth: each is executed by a free-flying gripper in its own scene.
+"""Simulated lifts of a network's best grasps: a free-flying gripper executes each in its own scene.
 
 Scenes are built once and kept, so that a validation costs only the lifts.
 """
@@ -12,6 +12,7 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, best_pixel
 from mpgrasp.motion.lift_trial import LiftRig
+from mpgrasp.outcome import Outcome
 from mpgrasp.training.augmentation import Sample
 from mpgrasp.training.data.views import make_scene, stored_intrinsics, stored_pose
 from mpgrasp.training.dataset import GraspDataset
@@ -32,7 +33,7 @@ class LiftCheck:
         angle: NDArray[np.float32],
         width: NDArray[np.float32],
     ) -> bool:
-        """Whether the best grasp of the maps (H, W), angles [rad], widths [px], lifts an object.
+        """True if the best grasp of the maps (H, W), angles [rad], widths [px], lifts an object.
 
         Args:
             index: which image of the data set.
@@ -53,7 +54,7 @@ class LiftCheck:
             intrinsics=stored_intrinsics().resize(size, size),
             T_world_camera=_pose(self._dataset, index),
         )
-        return self._rig(index).attempt(grasps.grasp_at(*best_pixel(quality))).outcome == "success"
+        return self._rig(index).attempt(grasps.grasp_at(*best_pixel(quality))).outcome == Outcome.SUCCESS
 
     def _rig(self, index: int) -> LiftRig:
         scene = self._dataset.scene(index)
@@ -63,7 +64,7 @@ class LiftCheck:
 
 
 def images_to_lift(dataset: GraspDataset, images: NDArray[np.intp], count: int) -> list[int]:
-    """`count` of the images that have a labelled grasp, of as many scenes as possible.
+    """Return `count` of the images that have a labelled grasp, of as many scenes as possible.
 
     Raises:
         ConfigError: the shards tell neither scene nor pose.

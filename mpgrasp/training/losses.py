@@ -22,7 +22,7 @@ PARTS = ("loss", "pos", "cos", "sin", "width")
 
 
 def to_tensors(batch: Batch, width_px: float) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-    """Image, quality, angle, width and valid of a batch; widths in units of the head, `width_px` each."""
+    """Return image, quality, angle, width and valid of a batch; widths in units of `width_px`."""
     return (
         torch.from_numpy(batch.image),
         torch.from_numpy(batch.quality),
@@ -40,7 +40,7 @@ def grasp_loss(
     valid: Tensor,
     config: LossConfig,
 ) -> dict[str, Tensor]:
-    """Losses by part, and their weighted sum as "loss".
+    """Return losses by part, and their weighted sum as "loss".
 
     Args:
         heads: pos, cos, sin and width, each (n, 1, H, W).

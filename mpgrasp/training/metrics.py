@@ -1,4 +1,4 @@
-"""Does a network's best grasp of an image agree with a label: densely, and by the grasp rectangle metric.
+"""Agreement of a network's best grasp of an image with its labels: densely, and by the rectangle metric.
 
 Neither executes anything. A hit means that a labelled grasp lies where the network would grasp, in its
 direction.
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from mpgrasp.geometry import line_angle_difference
 from mpgrasp.grasp import GraspRectangle, best_pixel
-from mpgrasp.training.dataset import GraspDataset, Sample
+from mpgrasp.training.augmentation import Sample
+from mpgrasp.training.dataset import GraspDataset
 
 NEAR = 2
-"""How far from the best pixel a label may lie to count, along rows and columns [px]."""
+"""Distance from the best pixel within which a label counts, along rows and columns [px]."""
 MAX_ANGLE = np.deg2rad(30.0)
 """Largest angle between a grasp and a label that agree; also the rectangle metric's [rad]."""
 MIN_IOU = 0.25
@@ -33,8 +34,8 @@ JAW_SHARE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What one image's best grasp is worth."""
+class LabelMatch:
+    """Agreement of one image's best grasp with the labels."""
 
     hit: bool
     """A good label within `NEAR`, angle and opening agree."""
@@ -48,10 +49,10 @@ class Verdict:
     """The same where the opening agrees too, as a share of the image's best label."""
 
 
-def judge(
+def match_labels(
     quality: NDArray[np.float32], angle: NDArray[np.float32], width: NDArray[np.float32], truth: Sample
-) -> Verdict:
-    """Verdict on the best pixel of (quality, angle, width), each (H, W), angles [rad], widths [px]."""
+) -> LabelMatch:
+    """Compare the best pixel of maps (H, W), angles [rad], widths [px], with the labels of the image."""
     row, col = best_pixel(quality)
     around = _window(row, col, NEAR, quality.shape)
     theta, opening = float(angle[row, col]), float(width[row, col])
@@ -60,7 +61,7 @@ def judge(
     ratio = opening / np.maximum(truth.width[around], 1e-6)
     fits = (ratio >= OPENING[0]) & (ratio <= OPENING[1])
     labels = truth.quality[around] * agrees
-    return Verdict(
+    return LabelMatch(
         hit=bool((good[around] & agrees & fits).any()),
         rectangle=_rectangle_hit(row, col, theta, opening, truth, good),
         quality=float(quality[row, col]),
@@ -97,30 +98,30 @@ def _rectangle(row: int, col: int, theta: float, opening: float) -> GraspRectang
 
 
 def summarise(
-    verdicts: Mapping[int, Verdict],
+    matches: Mapping[int, LabelMatch],
     graspable: Mapping[int, bool],
     dataset: GraspDataset,
     lifted: Mapping[int, bool] | None = None,
 ) -> dict[str, float]:
-    """Rates over images with a labelled grasp, for all and by group; and what is claimed where there is none.
+    """Return rates over images with a labelled grasp, for all and by group, and claims where there is none.
 
     Keys: score, hit, rectangle, label_quality, claimed (mean quality of the best pixel), empty_claimed (the
     same of images without any label), n; lift and n_lift, of the images whose best grasp was executed;
     hit_<group> and n_<group> for thin, thick, low, mid and high cameras.
     """
-    images = np.array([i for i in verdicts if graspable[i]], int)
-    empty = [verdicts[i].quality for i in verdicts if not graspable[i]]
+    images = np.array([i for i in matches if graspable[i]], int)
+    empty = [matches[i].quality for i in matches if not graspable[i]]
     summary = {"n": float(len(images)), "n_empty": float(len(empty))}
     if empty:
         summary["empty_claimed"] = float(np.mean(empty))
     if not len(images):
         return summary
-    hits = np.array([verdicts[i].hit for i in images], float)
-    summary["score"] = float(np.mean([verdicts[i].score for i in images]))
+    hits = np.array([matches[i].hit for i in images], float)
+    summary["score"] = float(np.mean([matches[i].score for i in images]))
     summary["hit"] = float(hits.mean())
-    summary["rectangle"] = float(np.mean([verdicts[i].rectangle for i in images]))
-    summary["label_quality"] = float(np.mean([verdicts[i].label_quality for i in images]))
-    summary["claimed"] = float(np.mean([verdicts[i].quality for i in images]))
+    summary["rectangle"] = float(np.mean([matches[i].rectangle for i in images]))
+    summary["label_quality"] = float(np.mean([matches[i].label_quality for i in images]))
+    summary["claimed"] = float(np.mean([matches[i].quality for i in images]))
     if lifted:
         summary |= {"lift": float(np.mean(list(lifted.values()))), "n_lift": float(len(lifted))}
     for name, members in _groups(dataset).items():
@@ -143,6 +144,6 @@ def _groups(dataset: GraspDataset) -> dict[str, NDArray[np.bool_]]:
 
 
 def format_summary(summary: Mapping[str, float]) -> str:
-    """The summary in one line."""
+    """Return the summary in one line."""
     rates = [f"{k} {v:.3f}" for k, v in summary.items() if not k.startswith("n")]
     return "  ".join([f"n {summary.get('n', 0):.0f}", *rates])

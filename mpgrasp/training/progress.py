@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from types import TracebackType
 
 LINE_EVERY = 30.0
-"""Between lines of a log [s]."""
+"""Time between lines of a log [s]."""
 FORGET = 0.95
 """Smoothing of the losses shown, per step."""
 
@@ -45,7 +45,7 @@ class ProgressLog:
         self._bar.stop()
 
     def update(self, progress: float, step: int, images: int, losses: Mapping[str, float]) -> None:
-        """After a step: share of the budget, steps and images so far, and the step's losses."""
+        """Show a step: share of the budget, steps and images so far, and the step's losses."""
         for key, value in losses.items():
             self._losses[key] = FORGET * self._losses.get(key, value) + (1 - FORGET) * value
         now = time.monotonic()
@@ -61,7 +61,7 @@ class ProgressLog:
             print(f"{100 * progress:5.1f} %  {text}", file=sys.stderr, flush=True)
 
     def note(self, text: str) -> None:
-        """One line that stays."""
+        """Show one line that stays."""
         if self._terminal:
             self._bar.console.print(text, markup=False, highlight=False)
         elif not self._quiet:

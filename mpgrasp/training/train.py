@@ -11,26 +11,25 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
-from mpgrasp.detectors.networks.registry import INPUT_SIZE
+from mpgrasp.detectors.networks.registry import NETWORKS, declaration
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.training.trainer_config import TRAINABLE, TrainConfig
+from mpgrasp.training.trainer_config import TrainConfig
 
 if TYPE_CHECKING:
     from mpgrasp.training.trainer import Trainer
 
 NOT_OPTIONS = ("name", "command", "run", "default_of")
-"""What parsed arguments hold beside this command's options."""
+"""Names in parsed arguments that are not options of this command."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
+    """Add the options of `python -m mpgrasp.training train`; defaults are TrainConfig's."""
     defaults = TrainConfig(name="dhrnet")
     loss, image = defaults.loss, defaults.input
     parser.set_defaults(default_of=parser.get_default)
     add = parser.add_argument
-    add("name", help="network: " + ", ".join(TRAINABLE))
+    add("name", help="network: " + ", ".join(NETWORKS))
     add("--data", type=Path, nargs="+", required=True, metavar="DIR", help="directories of shards")
     add(
         "--validation",
@@ -94,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Run the command; returns the exit code. Ctrl-C keeps what was learnt so far.
+    """Run the command and return its exit code. Ctrl-C keeps what was learnt so far.
 
     Raises:
         MpgraspError: unusable options, data or files.
@@ -136,7 +135,7 @@ def main(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _stopping(trainer: Trainer) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM ends the run between two steps, so that it can be resumed to the bit."""
+    """Let the first Ctrl-C or SIGTERM end the run between two steps, so that it resumes to the bit."""
 
     def stop(signum: int, frame: object) -> None:
         trainer.stop()
@@ -157,7 +156,7 @@ def _stopping(trainer: Trainer) -> Iterator[None]:
 
 
 def command_line(args: argparse.Namespace) -> str:
-    """The command that the arguments stand for, without what is at its default."""
+    """Return the command that the arguments stand for, without what is at its default."""
     words = ["python", "-m", "mpgrasp.training", "train", args.name]
     for name, value in vars(args).items():
         if name in NOT_OPTIONS or value == args.default_of(name):
@@ -168,7 +167,7 @@ def command_line(args: argparse.Namespace) -> str:
 
 
 def config_from(args: argparse.Namespace) -> TrainConfig:
-    """The training's settings from the command line's.
+    """Return the training's settings from the command line's.
 
     Raises:
         ConfigError: settings that cannot be used.
@@ -186,7 +185,7 @@ def config_from(args: argparse.Namespace) -> TrainConfig:
         name=args.name,
         settings=settings,
         input=NetworkInput(
-            size=INPUT_SIZE.get(args.name, NETWORK_SIZE),
+            size=declaration(args.name).input_size,
             modality=args.input,
             centre=args.centre,
             scale=args.scale,

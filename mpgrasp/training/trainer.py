@@ -16,7 +16,6 @@ import dataclasses
 import math
 import time
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -31,18 +30,15 @@ from mpgrasp.training.curves import write_curves
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.losses import PARTS, grasp_loss
 from mpgrasp.training.metrics import format_summary
+from mpgrasp.training.optimiser import make_optimiser, rate_at, update_average
 from mpgrasp.training.progress import ProgressLog
 from mpgrasp.training.trainer_config import TrainConfig
 from mpgrasp.training.validation import SELECT_BY, Validator
 
-WARM_UP = 0.03
-"""Share of the budget over which the learning rate rises."""
-FLOOR = 0.01
-"""Learning rate at the end, as a share of the highest."""
 MAX_GRADIENT = 5.0
 """Gradients are shortened to this norm."""
 CHECKPOINT_EVERY = 180.0
-"""[s]"""
+"""Time between checkpoints [s]."""
 RESUMED = ("step", "elapsed", "validated", "best", "history")
 """Plain values of a run that a checkpoint holds."""
 READ_EVERY = 20
@@ -55,12 +51,12 @@ class Trainer:
     Validation images are all of `validation`, where there is one, and else what `dataset` holds out.
 
     Args:
-        config: how to train.
-        dataset: what to train on.
+        config: settings of the training.
+        dataset: images to train on.
         out: weights file; the checkpoint lies beside it.
-        validation: what to validate on.
+        validation: images to validate on.
         curves: CSV file of the curves, with a PNG beside it; by default they lie beside `out`.
-        command: what the run was started with, for the training card.
+        command: command that started the run, for the training card.
 
     Raises:
         ConfigError: a network that cannot be built, or data that cannot be validated on.
@@ -98,9 +94,7 @@ class Trainer:
             config, self.validation, self.weights.width_px, self.device, held=self.validation is dataset
         )
         self.batches = Batches(config, dataset, self.weights.width_px, self.device)
-        self.optimiser = torch.optim.AdamW(
-            _parameter_groups(self.network, config.weight_decay), lr=config.lr, fused=True
-        )
+        self.optimiser = make_optimiser(self.network, config)
         self.average = {k: v.detach().clone() for k, v in self.network.state_dict().items()}
         self.step = 0
         self.elapsed = 0.0
@@ -112,12 +106,12 @@ class Trainer:
 
     @property
     def checkpoint(self) -> Path:
-        """Where the state of the run is kept."""
+        """File that keeps the state of the run."""
         return self.out.with_suffix(".checkpoint")
 
     @property
     def parameters(self) -> int:
-        """Numbers that are trained."""
+        """Number of values that are trained."""
         return sum(p.numel() for p in self.network.parameters())
 
     @property
@@ -170,40 +164,22 @@ class Trainer:
         return self.best
 
     def train_step(self, batch: tuple[Tensor, ...]) -> Tensor:
-        """One step of the optimiser on (image, quality, angle, width, valid); returns the losses `PARTS`."""
+        """Take one step on (image, quality, angle, width, valid) and return the losses `PARTS`."""
         self.network.train()
         for group in self.optimiser.param_groups:
-            group["lr"] = self.config.lr * self._rate()
+            group["lr"] = self.config.lr * rate_at(self.progress, self.config.schedule)
         image, quality, angle, width, valid = (t.to(self.device, non_blocking=True) for t in batch)
         low = self.config.precision == "bfloat16"
         with torch.autocast(self.device.type, torch.bfloat16, enabled=low):
             heads = self.network(image.contiguous(memory_format=torch.channels_last))
         parts = grasp_loss(heads, quality, angle, width, valid, self.config.loss)
         self.optimiser.zero_grad(set_to_none=True)
-        parts["loss"].backward()
+        torch.autograd.backward(parts["loss"])
         nn.utils.clip_grad_norm_(self.network.parameters(), MAX_GRADIENT)
         self.optimiser.step()
         self.step += 1
-        self._update_average()
+        update_average(self.average, self.network, self.config.average, self.step)
         return torch.stack([parts[name].detach() for name in PARTS])
-
-    def _rate(self) -> float:
-        if self.progress < WARM_UP:
-            return max(self.progress / WARM_UP, 0.01)
-        if self.config.schedule == "constant":
-            return 1.0
-        phase = (self.progress - WARM_UP) / (1 - WARM_UP)
-        return FLOOR + (1 - FLOOR) * 0.5 * (1 + math.cos(math.pi * phase))
-
-    @torch.no_grad()
-    def _update_average(self) -> None:
-        # young averages forget faster, so that the initial weights are soon gone
-        decay = min(self.config.average, self.step / (self.step + 10)) if self.config.average else 0.0
-        state = self.network.state_dict()
-        moving = [key for key, value in state.items() if value.is_floating_point()]
-        torch._foreach_lerp_([self.average[k] for k in moving], [state[k] for k in moving], 1 - decay)
-        for key in state.keys() - moving:
-            self.average[key].copy_(state[key])
 
     def _read_losses(self, steps: list[Tensor], log: ProgressLog) -> None:
         if not steps:
@@ -236,7 +212,7 @@ class Trainer:
             log.note(f"{arrived} more shards, {len(self.dataset.training)} training images")
 
     def evaluate(self) -> dict[str, float]:
-        """Validation of the averaged weights; see Validator."""
+        """Validate the averaged weights and return the summary; see Validator."""
         own = {k: v.clone() for k, v in self.network.state_dict().items()}
         self.network.load_state_dict(self.average)
         summary = self.validator.evaluate(self.network)
@@ -296,13 +272,3 @@ class Trainer:
         except (KeyError, ValueError, RuntimeError) as error:
             raise WeightsError(f"checkpoint cannot be used: {error}", got=str(self.checkpoint)) from error
         return True
-
-
-def _parameter_groups(network: nn.Module, weight_decay: float) -> list[dict[str, Any]]:
-    """Weights that are decayed, and biases, normalisations and relative positions, which are not."""
-    named = list(network.named_parameters())
-    free = {name for name, p in named if p.ndim < 2 or name.endswith("bias")}
-    return [
-        {"params": [p for name, p in named if name not in free], "weight_decay": weight_decay},
-        {"params": [p for name, p in named if name in free], "weight_decay": 0.0},
-    ]

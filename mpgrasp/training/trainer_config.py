@@ -8,12 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import NETWORKS
+from mpgrasp.detectors.networks.registry import check_network
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.augmentation import Augmentation
-
-TRAINABLE = tuple(NETWORKS)
-"""Networks that can be trained."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,14 +36,14 @@ class LossConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
-    """How to train."""
+    """Settings of a training."""
 
     name: str
-    """Network, a key of `TRAINABLE`."""
+    """Name of the network in the registry."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """Of the network's config, beside its channels."""
+    """Settings of the network's config, beside its channels."""
     input: NetworkInput = field(default_factory=lambda: NetworkInput(centre="median", scale=20.0))
-    """What the network sees."""
+    """Form of the images that the network sees."""
     loss: LossConfig = field(default_factory=LossConfig)
     augmentation: Augmentation | None = field(default_factory=Augmentation)
     """None: images as they are."""
@@ -59,7 +56,7 @@ class TrainConfig:
     lr: float = 1e-4
     """Highest learning rate."""
     precision: str = "bfloat16"
-    """Of the convolutions: "bfloat16", or "float32" where the processor does not compute in that."""
+    """Precision of the convolutions: "bfloat16", or "float32" where the processor does not know that."""
     schedule: str = "cosine"
     """"cosine" down to a hundredth, or "constant"; either after a warm-up. The paper names none."""
     weight_decay: float = 5e-2
@@ -67,23 +64,22 @@ class TrainConfig:
     average: float = 0.998
     """Decay per step of the running average of the weights; 0 saves the weights themselves."""
     thin_weight: float = 1.0
-    """How much oftener images of thin objects are drawn."""
+    """Factor by which images of thin objects are drawn more often."""
     images: int | None = None
     """Train on the first so many images only; None takes all."""
     seed: int = 0
-    """Of initial weights, order and augmentation."""
+    """Seed of initial weights, order and augmentation."""
     holdout: float = 0.08
     """Share of scenes for validation."""
     validation_images: int = 384
-    """At most so many images are validated on."""
+    """Largest number of images that are validated on."""
     lift_images: int = 48
-    """At most so many of them are also grasped in simulation, where the network would."""
+    """Largest number of them that are also grasped in simulation, where the network would."""
     validate_every: float = 0.1
     """Share of the budget between validations."""
 
     def __post_init__(self) -> None:
-        if self.name not in TRAINABLE:
-            raise ConfigError("unknown network", got=self.name, allowed=TRAINABLE)
+        check_network(self.name)
         if self.schedule not in ("cosine", "constant"):
             raise ConfigError("unknown schedule", got=self.schedule, allowed=("cosine", "constant"))
         if self.precision not in ("bfloat16", "float32"):

@@ -12,7 +12,7 @@ from torch import nn
 from mpgrasp.detectors.network_detector import postprocess
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.losses import grasp_loss, to_tensors
-from mpgrasp.training.metrics import judge, summarise
+from mpgrasp.training.metrics import match_labels, summarise
 from mpgrasp.training.trainer_config import TrainConfig
 
 if TYPE_CHECKING:
@@ -50,10 +50,10 @@ class Validator:
 
     @torch.inference_mode()
     def evaluate(self, network: nn.Module) -> dict[str, float]:
-        """See metrics.summarise; and "validation_loss". The network is left in evaluation mode."""
+        """Return metrics.summarise and "validation_loss"; the network is left in evaluation mode."""
         network.eval()
         images, lift = self.images, self._chosen_to_lift()
-        verdicts, graspable, lifted = {}, {}, {}
+        matches, graspable, lifted = {}, {}, {}
         total = 0.0
         for chunk in np.array_split(images, math.ceil(len(images) / BATCH)) if len(images) else ():
             heads, loss = self._run(network, chunk)
@@ -61,15 +61,15 @@ class Validator:
             for i, maps in zip(chunk.tolist(), heads, strict=True):
                 truth = self._data.sample(i).resized(self._config.input.size)
                 best = postprocess(maps, self._width_px)
-                verdicts[i] = judge(*best, truth)
+                matches[i] = match_labels(*best, truth)
                 graspable[i] = bool(truth.quality.any())
                 if i in lift:
                     lifted[i] = self._lift_check().lifts(i, truth, *best)
-        summary = summarise(verdicts, graspable, self._data, lifted)
+        summary = summarise(matches, graspable, self._data, lifted)
         return summary | ({"validation_loss": total / len(images)} if len(images) else {})
 
     def _run(self, network: nn.Module, chunk: np.ndarray) -> tuple[np.ndarray, float]:
-        """Raw heads (n, 4, H, W), and the mean loss."""
+        """Return raw heads (n, 4, H, W), and the mean loss."""
         batch = self._data.batch(chunk, self._config.input)
         image, quality, angle, width, valid = (t.to(self._device) for t in to_tensors(batch, self._width_px))
         low = self._config.precision == "bfloat16"

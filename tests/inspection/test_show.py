@@ -173,7 +173,8 @@ def test_unusable_input_is_one_line_and_exit_code_2(
 def test_a_card_tells_the_network_and_how_it_was_trained(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from mpgrasp.detectors.networks.weights import NetworkWeights, build_network, save_weights
+    from mpgrasp.detectors.networks.registry import build_network
+    from mpgrasp.detectors.networks.weights import NetworkWeights, save_weights
 
     file = tmp_path / "some.safetensors"
     network = build_network("ggcnn2", {})

@@ -41,7 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
     from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
     from mpgrasp.bench.playing.programme import PROGRAMMES
     from mpgrasp.bench.playing.workers import HANG_AFTER
-    from mpgrasp.detectors.networks.registry import RUNTIMES
+    from mpgrasp.detectors.runtimes import RUNTIMES
     from mpgrasp.plugins import controller_names, detector_names
     from mpgrasp.suite import suite_names
 

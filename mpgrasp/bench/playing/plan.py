@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpgrasp.bench.record import Cell, Task
-from mpgrasp.detectors.networks.registry import RUNTIMES
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.suite import Suite
 

@@ -19,11 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.antipodal.turned_view import TurnedView, odd
+from mpgrasp.detectors.antipodal.turned_map import TurnedMap, odd
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.height_map import HeightMap
-
-__all__ = ["HandGeometry", "WorldGrasps", "antipodal_grasps", "quality_along"]
 
 Float32 = NDArray[np.float32]
 
@@ -50,7 +48,7 @@ class WorldGrasps:
 def antipodal_grasps(
     height_map: HeightMap, hand: HandGeometry | None = None, *, n_angles: int = 18
 ) -> WorldGrasps:
-    """Grasps centred on every cell of the map.
+    """Return grasps centred on every cell of the map.
 
     Args:
         height_map: the scene.
@@ -80,7 +78,7 @@ def antipodal_grasps(
 
 
 def quality_along(height_map: HeightMap, angle: float, hand: HandGeometry | None = None) -> Float32:
-    """(ny, nx) worth of grasps that close along `angle` [rad] as it stands, be it the best there or not."""
+    """Return the worth (ny, nx) of grasps that close along `angle` [rad], be it the best there or not."""
     quality = np.zeros(height_map.height.shape, np.float32)
     if height_map.label.any():
         window, height, label, masses = _around_objects(height_map)
@@ -92,7 +90,7 @@ def quality_along(height_map: HeightMap, angle: float, hand: HandGeometry | None
 def _around_objects(
     height_map: HeightMap,
 ) -> tuple[tuple[slice, slice], Float32, Float32, FloatArray]:
-    """The window of the map that matters, its height and label, and the objects' centres of mass there."""
+    """Return the window of the map that matters, its height and label, and the objects' centres of mass."""
     rows, cols = np.nonzero(height_map.label)
     # a finger and its margin beyond the objects
     pad = int(np.ceil(0.04 / height_map.cell))
@@ -106,7 +104,7 @@ def _around_objects(
 
 
 def _centres_of_mass(above: Float32, label: Float32) -> FloatArray:
-    """(n_labels, 2) as (row, col) of what is seen of each object, weighted by height; row 0 is unused."""
+    """Return centres (n_labels, 2) as (row, col) of each object, weighted by height; row 0 is unused."""
     flat = label.astype(int).ravel()
     rows, cols = np.indices(label.shape).reshape(2, -1)
     weight = np.maximum(above.ravel(), 1e-4)
@@ -119,7 +117,7 @@ def _centres_of_mass(above: Float32, label: Float32) -> FloatArray:
 def _at_angle(
     height: Float32, label: Float32, masses: FloatArray, theta: float, cell: float, hand: HandGeometry
 ) -> Float32:
-    """Quality, opening [m] and turn [rad] (h, w, 3) of grasps that close along `theta`."""
+    """Return quality, opening [m] and turn [rad] (h, w, 3) of grasps that close along `theta`."""
     h, w = label.shape
     c, s = np.cos(theta), np.sin(theta)
     R = np.array([[c, -s], [s, c]])  # turned (col, row) offsets -> the map's
@@ -131,7 +129,7 @@ def _at_angle(
         (int(size[0]), int(size[1])),
         flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
     )
-    view = TurnedView(
+    turned_map = TurnedMap(
         turned[..., 0].astype(np.float32),
         turned[..., 1].astype(np.float32),
         (masses[:, ::-1] - offset) @ R,
@@ -139,8 +137,8 @@ def _at_angle(
         hand,
     )
     result = np.zeros((*turned.shape[:2], 3), np.float32)
-    for level in view.levels():
-        part, window = view.around(level)
+    for level in turned_map.levels():
+        part, window = turned_map.around(level)
         if part is not None:
             part.add_grasps(level, result[window])
     q = np.minimum(result[..., :1], 1)

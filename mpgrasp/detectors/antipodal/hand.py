@@ -1,4 +1,4 @@
-"""The gripper as the grasp analysis sees it."""
+"""Geometry of the hand for the grasp analysis: boxes around pads, fingers, palm and wrist camera."""
 
 from __future__ import annotations
 
@@ -7,36 +7,37 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.robot import hand
 
 
 @dataclass(frozen=True, kw_only=True)
 class HandGeometry:
     """The hand as the analysis sees it: boxes around pads, fingers and palm; a Panda hand by default."""
 
-    pad_width: float = 0.0176
-    """Of a pad across the closing direction [m]."""
+    pad_width: float = hand.FINGER_WIDTH
+    """Width of a pad across the closing direction [m]."""
     play: float = 0.004
     """Free space wanted around a finger across the closing direction, both sides together [m]."""
-    finger_thickness: float = 0.0144
+    finger_thickness: float = hand.FINGER_THICKNESS
     """Space that a finger tip needs outside of the opening [m]."""
     shaft_thickness: float = 0.026
     """Space that a finger needs outside of the opening above its straight tip [m]."""
     tip_height: float = 0.016
     """Height of the straight tip [m]."""
-    max_opening: float = 0.080
+    max_opening: float = hand.GRIPPER_MAX_WIDTH
     """Widest opening between the pads [m]."""
     max_contact_width: float = 0.072
     """Widest thing to close on, so that both fingers still pass beside it [m]."""
     reach: float = 0.042
-    """How far the tips go below the surface point before the palm comes near [m]."""
+    """Depth to which the tips go below the surface point before the palm comes near [m]."""
     palm_clearance: float = 0.045
-    """How far above the tips anything under the palm may rise [m]."""
+    """Height above the tips that nothing under the palm may exceed [m]."""
     palm_size: tuple[float, float] = (0.204, 0.064)
     """The palm along and across the closing direction [m]."""
     camera_clearance: float = 0.070
-    """How far above the tips anything under the wrist camera may rise [m]."""
+    """Height above the tips that nothing under the wrist camera may exceed [m]."""
     camera_offset: float = 0.070
-    """From the tool point to the camera, across the closing direction and on either side [m]."""
+    """Distance from the tool point to the camera, across the closing direction and on either side [m]."""
     camera_size: tuple[float, float] = (0.094, 0.034)
     """The camera along and across the closing direction, with a little play [m]."""
     tip_clearance: float = 0.0005
@@ -44,7 +45,8 @@ class HandGeometry:
     margin: tuple[float, float] = (0.005, 0.008)
     """Least and wanted free space between object and open pad, on each side [m]."""
     opening_margin: float = 0.010
-    """What the execution adds to a grasp's width, both sides together [m]; at most twice the least margin."""
+    """Opening that the execution adds to a grasp's width, both sides together [m]; at most twice the least
+    margin."""
     min_depth: float = 0.0012
     """Least height of the contacts above the tips [m]."""
     friction_angle: float = np.deg2rad(25.0)

@@ -10,23 +10,13 @@ import copy
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.networks.registry import INPUT_SIZE, build_network
+from mpgrasp.detectors.networks.registry import NETWORKS, build_network, declaration
 
 if TYPE_CHECKING:
     from torch import nn
 
 CHANNELS = (1, 3, 4)
 """Input channels of depth, colour and both."""
-SOURCES = {
-    "dhrnet": "the paper; branches as in [HRNet](https://arxiv.org/abs/1908.07919)",
-    "tfgrasp": "[TF-Grasp](https://arxiv.org/abs/2202.11911)",
-    "ggcnn": "[GG-CNN](https://arxiv.org/abs/1804.05172)",
-    "ggcnn2": "[GG-CNN2](https://doi.org/10.1177/0278364919859066)",
-    "fcn": "the paper's Fig. 8; [FCN](https://arxiv.org/abs/1411.4038)",
-    "fcn_residual": "the paper's Fig. 8; [residual blocks](https://arxiv.org/abs/1512.03385)",
-    "unet": "the paper's Fig. 8; [U-Net](https://arxiv.org/abs/1505.04597)",
-}
 _TEXT = """\
 # Networks
 
@@ -51,12 +41,12 @@ are not counted. More input channels only enlarge the first convolution.
 
 
 def parameters(network: nn.Module) -> int:
-    """Numbers that training learns."""
+    """Return the number of values that training learns."""
     return sum(p.numel() for p in network.parameters())
 
 
 def flops(network: nn.Module, channels: int, size: int) -> float:
-    """2 x multiply-adds of convolutions and matrix products for one (channels, size, size) image."""
+    """Return 2 x multiply-adds of convolutions and matrix products for a (channels, size, size) image."""
     import torch
     from torch.utils.flop_counter import FlopCounterMode
 
@@ -66,39 +56,32 @@ def flops(network: nn.Module, channels: int, size: int) -> float:
     return float(counter.get_total_flops())
 
 
-def presets() -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """(network, preset, settings) of the networks in the table."""
-    from mpgrasp.detectors.networks.dhrnet import AUTHORS
-
-    yield "dhrnet", "shipped", {}
-    yield "dhrnet", "authors", AUTHORS
-    yield "dhrnet", "all branches (Fig. 9b)", {"head": "all", "fine_head": False}
-    yield "dhrnet", "lower branches (Fig. 9a)", {"head": "lower", "fine_head": False}
-    yield "dhrnet", "highest branch", {"head": "highest", "fine_head": False}
-    yield "tfgrasp", "authors", {}
-    yield "ggcnn", "authors", {}
-    yield "ggcnn2", "authors", {}
-    yield from ((name, "ablation", {}) for name in ("fcn", "fcn_residual", "unet"))
+def variants() -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield (network, variant, settings) of the rows in the table."""
+    for name in NETWORKS:
+        for variant, settings in declaration(name).variants.items():
+            yield name, variant, dict(settings)
 
 
 def document() -> str:
-    """The text of docs/networks.md."""
+    """Return the text of docs/networks.md."""
     import torch
 
     lines = ["| network | preset | input | channels | parameters | GFLOP | source |", "|" + " --- |" * 7]
-    for name, preset, settings in presets():
-        size = INPUT_SIZE.get(name, NETWORK_SIZE)
+    for name, variant, settings in variants():
+        declared = declaration(name)
+        size = declared.input_size
         for channels in CHANNELS if not settings else CHANNELS[:1]:
             with torch.device("meta"):
                 network = build_network(name, {**settings, "channels": channels})
             cells = (
                 f"`{name}`",
-                preset,
+                variant,
                 f"{size}x{size}",
                 channels,
                 f"{parameters(network):,}",
                 f"{flops(network, channels, size) / 1e9:.2f}",
-                SOURCES[name],
+                declared.source,
             )
             lines.append("| " + " | ".join(map(str, cells)) + " |")
     return _TEXT.format(table="\n".join(lines))

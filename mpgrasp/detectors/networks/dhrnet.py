@@ -16,7 +16,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.blocks import BN_MOMENTUM, GraspNetwork, conv_bn, resize
+from mpgrasp.detectors.networks.declaration import NetworkDeclaration
+from mpgrasp.detectors.networks.grasp_network import BN_MOMENTUM, GraspNetwork, conv_bn, resize
 from mpgrasp.exceptions import ConfigError
 
 HEAD_BRANCHES = {"all": slice(None), "lower": slice(1, None), "highest": slice(1)}
@@ -216,3 +217,19 @@ class _Mixed(nn.Module):
         for f, b in zip(list(self.mix)[1:], x[1:], strict=True):
             total = total + resize(f(b), x[0])
         return F.relu(self.norm(total), inplace=True)
+
+
+DECLARATIONS = {
+    "dhrnet": NetworkDeclaration(
+        network=DHRNet,
+        config=DHRNetConfig,
+        source="the paper; branches as in [HRNet](https://arxiv.org/abs/1908.07919)",
+        variants={
+            "shipped": {},
+            "authors": AUTHORS,
+            "all branches (Fig. 9b)": {"head": "all", "fine_head": False},
+            "lower branches (Fig. 9a)": {"head": "lower", "fine_head": False},
+            "highest branch": {"head": "highest", "fine_head": False},
+        },
+    ),
+}

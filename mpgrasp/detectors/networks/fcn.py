@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.blocks import GraspNetwork, conv_bn, resize
+from mpgrasp.detectors.networks.declaration import NetworkDeclaration
+from mpgrasp.detectors.networks.grasp_network import GraspNetwork, conv_bn, resize
 from mpgrasp.exceptions import ConfigError
 
 LEVELS = 5
@@ -42,9 +43,9 @@ class FCN(GraspNetwork):
     """(n, channels, H, W) -> pos, cos, sin and width, each (n, 1, H, W); H and W are multiples of 32."""
 
     residual = False
-    """Whether blocks add their input to their output."""
+    """True if blocks add their input to their output."""
     skips = False
-    """Whether the decoder sees the encoder's features of its resolution."""
+    """True if the decoder sees the encoder's features of its resolution."""
 
     def __init__(self, config: FCNConfig | None = None) -> None:
         super().__init__()
@@ -75,7 +76,7 @@ class FCN(GraspNetwork):
         return self.maps(features, x)
 
     def join(self, decoded: Tensor, encoded: Tensor) -> Tensor:
-        """What the decoder goes on with; `encoded` are the encoder's features of the same resolution."""
+        """Return the decoder's next input; `encoded` are the encoder's features of the same resolution."""
         return decoded
 
 
@@ -96,3 +97,19 @@ class _Block(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         y: Tensor = self.body(x)
         return F.relu(y if self.skip is None else y + self.skip(x), inplace=True)
+
+
+DECLARATIONS = {
+    "fcn": NetworkDeclaration(
+        network=FCN,
+        config=FCNConfig,
+        source="the paper's Fig. 8; [FCN](https://arxiv.org/abs/1411.4038)",
+        variants={"ablation": {}},
+    ),
+    "fcn_residual": NetworkDeclaration(
+        network=ResidualFCN,
+        config=FCNConfig,
+        source="the paper's Fig. 8; [residual blocks](https://arxiv.org/abs/1512.03385)",
+        variants={"ablation": {}},
+    ),
+}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.registry import HEADS
+from mpgrasp.detectors.networks.declaration import HEADS, NetworkDeclaration, PublishedWeights
 from mpgrasp.exceptions import ConfigError
 
 
@@ -96,3 +96,29 @@ class GGCNN2(_GGCNN):
 def _conv_relu(inputs: int, outputs: int, kernel: int, dilation: int = 1) -> tuple[nn.Module, nn.Module]:
     padding = kernel // 2 * dilation
     return nn.Conv2d(inputs, outputs, kernel, padding=padding, dilation=dilation), nn.ReLU(inplace=True)
+
+
+_PUBLISHED_WIDTH_PX = 150.0
+_PUBLISHED_CARD = {
+    "data": "Cornell",
+    "source": "https://github.com/dougsm/ggcnn",
+    "licence": "BSD-3-Clause",
+}
+
+DECLARATIONS = {
+    "ggcnn": NetworkDeclaration(
+        network=GGCNN,
+        config=GGCNNConfig,
+        source="[GG-CNN](https://arxiv.org/abs/1804.05172)",
+        input_size=300,
+        published=PublishedWeights(entry="conv1.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD),
+    ),
+    "ggcnn2": NetworkDeclaration(
+        network=GGCNN2,
+        config=GGCNNConfig,
+        source="[GG-CNN2](https://doi.org/10.1177/0278364919859066)",
+        published=PublishedWeights(
+            entry="features.0.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD
+        ),
+    ),
+}

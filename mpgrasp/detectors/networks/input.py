@@ -1,4 +1,4 @@
-"""From an image without holes to what a network reads: the same in training and in the loop.
+"""Input of a network, made from an image without holes: the same in training and in the loop.
 
 The paper feeds depth (D), colour (RGB) or both (RGB-D). The published GG-CNN code feeds depth minus its mean,
 in metres, clipped to +-1. A stick 4 mm high is then a step of 0.004, below what a freshly initialised
@@ -23,14 +23,14 @@ CHANNELS = {"d": 1, "rgb": 3, "rgbd": 4}
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkInput:
-    """How images are presented to a network. The defaults are the published GG-CNN's."""
+    """Form in which images are presented to a network. The defaults are the published GG-CNN's."""
 
     size: int = NETWORK_SIZE
     """Side of the input image [px]."""
     modality: str = "d"
     """"d": depth, "rgb": colour, "rgbd": depth, then colour."""
     centre: str = "mean"
-    """What is subtracted from depth: "mean" or "median" of the image."""
+    """Value that is subtracted from depth: "mean" or "median" of the image."""
     clip: float = 1.0
     """Bound on the residual before it is scaled [m]."""
     scale: float = 1.0
@@ -57,18 +57,18 @@ class NetworkInput:
 
     @property
     def reads_depth(self) -> bool:
-        """Whether depth is part of the input."""
+        """True if depth is part of the input."""
         return self.modality != "rgb"
 
     @property
     def reads_colour(self) -> bool:
-        """Whether colour is part of the input."""
+        """True if colour is part of the input."""
         return self.modality != "d"
 
     def __call__(
         self, depth: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
     ) -> NDArray[np.float32]:
-        """Input (channels, H, W) for a depth image (H, W) [m] without NaN, and colour (H, W, 3).
+        """Return the input (channels, H, W) for a depth image (H, W) [m] without NaN, and colour (H, W, 3).
 
         Raises:
             ConfigError: the modality has colour and there is none, or one of another size.

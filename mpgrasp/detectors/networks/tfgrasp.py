@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.networks.registry import HEADS
+from mpgrasp.detectors.networks.declaration import HEADS, NetworkDeclaration
 from mpgrasp.exceptions import ConfigError
 
 PATCH = 4
@@ -29,7 +29,7 @@ MASKED = -1e4
 BIAS_STD = 0.02
 """Spread of first position biases."""
 HEAD_STD = 0.02
-"""Of the heads' initial weights."""
+"""Spread of the heads' first weights."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ class TFGrasp(nn.Module):
         self.config = c = config or TFGraspConfig()
         stages = range(len(c.depths))
         widths = [c.embed * 2**k for k in stages]
-        rates = torch.linspace(0, c.drop_path, sum(c.depths), device="cpu").split(c.depths)
+        rates = torch.split(torch.linspace(0, c.drop_path, sum(c.depths), device="cpu"), list(c.depths))
         self.patches = nn.Conv2d(c.channels, c.embed, PATCH, stride=PATCH)
         self.patch_norm = nn.LayerNorm(c.embed)
         self.encoder = nn.ModuleList(_Stage(c, k, rates[k].tolist()) for k in stages)
@@ -122,7 +122,7 @@ class TFGrasp(nn.Module):
         weights = torch.cat([getattr(self, f"{name}_output").weight for name in HEADS]).flatten(1)
         maps = F.linear(pixels, weights).float().permute(0, 5, 1, 3, 2, 4)
         maps = maps.reshape(x.shape[0], len(HEADS), self.config.size, self.config.size)
-        pos, cos, sin, width = maps.split(1, dim=1)
+        pos, cos, sin, width = torch.split(maps, 1, dim=1)
         return pos, cos, sin, width
 
 
@@ -161,7 +161,7 @@ class _Block(nn.Module):
         return y
 
     def _windowed(self, x: Tensor) -> Tensor:
-        """Attention in windows over (n, side, side, width), rolled by the shift and back."""
+        """Attend in windows over (n, side, side, width), rolled by the shift and back."""
         n, width, w, across = x.shape[0], x.shape[-1], self.window, self.side // self.window
         if self.shift:
             x = x.roll((-self.shift, -self.shift), dims=(1, 2))
@@ -192,7 +192,7 @@ class _Attention(nn.Module):
         self.offsets: Tensor
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
-        """X (n * windows, tokens, width); mask (windows, 1, tokens, tokens) or None -> as x."""
+        """Attend in windows: x (n * windows, tokens, width), mask (windows, 1, tokens, tokens) or None."""
         tokens, width = x.shape[1:]
         qkv = self.qkv(x).reshape(-1, tokens, 3, self.heads, width // self.heads)
         q, k, v = qkv.permute(2, 0, 3, 1, 4).unbind(0)  # each (n * windows, heads, tokens, width / heads)
@@ -210,7 +210,7 @@ class _Attention(nn.Module):
 
 
 def _offsets(window: int) -> Tensor:
-    """Index of the relative position of each pair of a window's tokens, (tokens, tokens)."""
+    """Return the index of the relative position of each pair of a window's tokens, (tokens, tokens)."""
     row, col = (a.flatten() for a in torch.meshgrid(*[torch.arange(window)] * 2, indexing="ij"))
     down, right = (a[:, None] - a[None, :] + window - 1 for a in (row, col))
     return down * (2 * window - 1) + right
@@ -254,7 +254,7 @@ class _Expand(nn.Module):
         self.norm = nn.LayerNorm(outputs)
 
     def parts(self, x: Tensor) -> Tensor:
-        """(n, H, W, width) -> (n, H, W, factor, factor, outputs)."""
+        """Expand tokens (n, H, W, width) to (n, H, W, factor, factor, outputs)."""
         n, height, across, _ = x.shape
         y: Tensor = self.norm(self.expand(x).reshape(n, height, across, self.factor, self.factor, -1))
         return y
@@ -263,3 +263,12 @@ class _Expand(nn.Module):
         n, height, across, _ = x.shape
         parts = self.parts(x).transpose(2, 3)
         return parts.reshape(n, height * self.factor, across * self.factor, -1)
+
+
+DECLARATIONS = {
+    "tfgrasp": NetworkDeclaration(
+        network=TFGrasp,
+        config=TFGraspConfig,
+        source="[TF-Grasp](https://arxiv.org/abs/2202.11911)",
+    ),
+}

@@ -9,9 +9,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from mpgrasp.detectors.networks.declaration import NetworkDeclaration
 from mpgrasp.detectors.networks.fcn import FCN, FCNConfig
-
-__all__ = ["FCNConfig", "UNet"]
 
 
 class UNet(FCN):
@@ -20,5 +19,15 @@ class UNet(FCN):
     skips = True
 
     def join(self, decoded: Tensor, encoded: Tensor) -> Tensor:
-        """Both, concatenated."""
+        """Return both, concatenated."""
         return torch.cat([decoded, encoded], dim=1)
+
+
+DECLARATIONS = {
+    "unet": NetworkDeclaration(
+        network=UNet,
+        config=FCNConfig,
+        source="the paper's Fig. 8; [U-Net](https://arxiv.org/abs/1505.04597)",
+        variants={"ablation": {}},
+    ),
+}

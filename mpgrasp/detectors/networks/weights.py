@@ -1,4 +1,4 @@
-"""Weight files: safetensors that say which network they are for, and the published GG-CNN state dicts."""
+"""Weight files: safetensors that say which network they are for, and published state dicts."""
 
 from __future__ import annotations
 
@@ -17,37 +17,18 @@ from torch import nn
 from mpgrasp import paths
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import INPUT_SIZE, NETWORKS, build_network
-from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
-
-__all__ = [
-    "NETWORKS",
-    "WIDTH_PX",
-    "NetworkWeights",
-    "build_network",
-    "default_weights",
-    "load_weights",
-    "read_card",
-    "save_weights",
-    "width_unit",
-]
+from mpgrasp.detectors.networks.registry import NETWORKS, build_network, check_network, declaration
+from mpgrasp.exceptions import OutputError, WeightsError
 
 FORMAT = "mpgrasp-weights-1"
-PUBLISHED_WIDTH_PX = 150.0
-"""What a width output of 1 means in the published GG-CNN files, in pixels of the network's own image [px]."""
 WIDTH_SHARE = 0.5
-"""The same for networks trained here, as a share of their image's side: 150 px of 300."""
-PUBLISHED = {"ggcnn": "conv1.weight", "ggcnn2": "features.0.weight"}
-"""Networks whose published state dicts can be read, and an entry that tells them apart."""
+"""Opening that a width output of 1 stands for in networks trained here, as a share of their image's side: 150
+of 300 px, as in the published GG-CNN files."""
 
 
 def width_unit(size: int) -> float:
-    """What a width output of 1 means [px] for a network trained here on images of that side [px]."""
+    """Return the opening that a width output of 1 stands for in networks trained here on such images [px]."""
     return WIDTH_SHARE * size
-
-
-WIDTH_PX = width_unit(NETWORK_SIZE)
-"""The same for images of `depth.NETWORK_SIZE` [px]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,13 +36,13 @@ class NetworkWeights:
     """A network with its weights, and what has to be known to use it."""
 
     name: str
-    """Key in `NETWORKS`."""
+    """Name in the registry of networks."""
     network: nn.Module
     settings: Mapping[str, Any]
     """Keyword arguments of the network's config."""
     input: NetworkInput = field(default_factory=NetworkInput)
-    width_px: float = WIDTH_PX
-    """What a width output of 1 means, in pixels of the network's image [px]; `width_unit` of its side."""
+    width_px: float = width_unit(NETWORK_SIZE)
+    """Opening that a width output of 1 stands for, in pixels of the network's image [px]."""
     card: Mapping[str, Any] = field(default_factory=dict)
     """Training card: data, seed, steps, time, metrics, licence."""
 
@@ -94,7 +75,7 @@ def save_weights(
 
 
 def default_weights(name: str) -> Path:
-    """The shipped weights of a network."""
+    """Return the path of a network's shipped weights."""
     return paths.WEIGHTS / f"{name}.safetensors"
 
 
@@ -105,8 +86,7 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
         ConfigError: there is no such network.
         WeightsError: the file is missing, unreadable or made for another network.
     """
-    if name not in NETWORKS:
-        raise ConfigError("unknown network", got=name, allowed=NETWORKS)
+    check_network(name)
     file = Path(path) if path is not None else default_weights(name)
     if not file.is_file():
         raise WeightsError("no such weights file", got=str(file), allowed="a .safetensors, .pt or .pth file")
@@ -116,7 +96,7 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
 
 
 def read_card(path: Path | str) -> dict[str, Any]:
-    """Everything a safetensors file says about itself: network, settings, input and training card.
+    """Return all that a safetensors file says about itself: network, settings, input and training card.
 
     Raises:
         WeightsError: the file is unreadable or of another make.
@@ -172,29 +152,32 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
 
 
 def _read_published(name: str, path: Path) -> NetworkWeights:
-    if name not in PUBLISHED:
+    declared = declaration(name)
+    if declared.published is None:
         raise WeightsError(f"{name} reads safetensors only", got=str(path), allowed="a .safetensors file")
     try:
         # weights_only: a pickle from elsewhere must not run code
         state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no common base for what a junk file may raise
         raise WeightsError(
-            "not a PyTorch file of tensors", got=str(path), allowed="a published GG-CNN state dict"
+            "not a PyTorch file of tensors", got=str(path), allowed=f"a published state dict of {name}"
         ) from error
     if not isinstance(state, dict) or not all(isinstance(v, torch.Tensor) for v in state.values()):
-        raise WeightsError("not a state dict", got=str(path), allowed="a published GG-CNN state dict")
-    for other, entry in PUBLISHED.items():
-        if other != name and entry in state and PUBLISHED[name] not in state:
-            raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
+        raise WeightsError("not a state dict", got=str(path), allowed=f"a published state dict of {name}")
+    if declared.published.entry not in state:
+        for other in NETWORKS:
+            published = declaration(other).published
+            if published is not None and published.entry in state:
+                raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
     network = build_network(name, {})
     _load_state(network, state, path)
     return NetworkWeights(
         name=name,
         network=network,
         settings={},
-        input=NetworkInput(size=INPUT_SIZE.get(name, NETWORK_SIZE)),
-        width_px=PUBLISHED_WIDTH_PX,
-        card={"data": "Cornell", "source": "https://github.com/dougsm/ggcnn", "licence": "BSD-3-Clause"},
+        input=NetworkInput(size=declared.input_size),
+        width_px=declared.published.width_px,
+        card=declared.published.card,
     )
 
 

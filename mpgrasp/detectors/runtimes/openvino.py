@@ -10,6 +10,7 @@ import contextlib
 import copy
 import functools
 import hashlib
+import importlib
 import inspect
 import json
 import logging
@@ -78,7 +79,7 @@ class OpenVinoRuntime:
 
 
 def openvino_precision() -> str | None:
-    """Precision "bf16" where the processor has instructions for it, else "f32"; None without OpenVINO."""
+    """Return "bf16" where the processor has instructions for it, else "f32"; None without OpenVINO."""
     try:
         capabilities = _core().get_property(_DEVICE, "OPTIMIZATION_CAPABILITIES")
     except (ImportError, RuntimeError) as error:
@@ -93,14 +94,14 @@ def _core() -> Any:
 
 
 def _openvino() -> ModuleType:
-    """The library, imported without its telemetry: who benchmarks a grasp has not agreed to report it."""
+    """Import the library without its telemetry: who benchmarks a grasp has not agreed to report it."""
     name = "openvino_telemetry"
     if "openvino" in sys.modules:
         return sys.modules["openvino"]
     before = sys.modules.get(name)
     sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed, which OpenVINO allows
     try:
-        import openvino
+        openvino = importlib.import_module("openvino")
     finally:
         if before is None:
             del sys.modules[name]
@@ -121,7 +122,7 @@ class _OneOutput(nn.Module):
 
 
 def _convert(weights: NetworkWeights) -> Any:
-    """OpenVINO's model of the network for one image; it folds batch norms when it compiles."""
+    """Return OpenVINO's model of the network for one image; it folds batch norms when it compiles."""
     shape = _shape(weights)
     network = _OneOutput(copy.deepcopy(weights.network).cpu().float().eval())
     with warnings.catch_warnings(), torch.inference_mode():
@@ -157,7 +158,7 @@ def _cache_file(weights: NetworkWeights, settings: dict[str, Any]) -> Path | Non
 
 
 def _read(file: Path | None) -> bytes | None:
-    """A compiled network; None if it is not there or not whole."""
+    """Read a compiled network; None if it is not there or not whole."""
     if file is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What computes a network: torch on a GPU, OpenVINO, or torch on the CPU.
+"""Runtimes, which compute a network: torch on a GPU, OpenVINO, or torch on the CPU.
 
 "auto" takes the fastest that is to be had: CUDA where there is a GPU, else OpenVINO, in bfloat16 where the
 processor has instructions for it, else torch with channels last. All of them give the same bits for the same
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.utils import fusion
 
-from mpgrasp.detectors.networks.registry import RUNTIMES
 from mpgrasp.detectors.networks.weights import NetworkWeights
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
 from mpgrasp.exceptions import ConfigError
 
@@ -34,14 +34,14 @@ class Runtime(Protocol):
     """A network that is ready to be run."""
 
     name: str
-    """What it is in two or three words, such as "openvino bf16"."""
+    """Name in two or three words, such as "openvino bf16"."""
     device: str
     """"cpu" or "cuda"."""
     cached: bool
-    """Whether it was compiled before, and only had to be read."""
+    """True if it was compiled before, and only had to be read."""
 
     def __call__(self, image: Float32) -> Float32:
-        """Heads (4, H, W) for an input (channels, H, W): quality, cosine, sine, width."""
+        """Return heads (4, H, W) for an input (channels, H, W): quality, cosine, sine, width."""
         ...
 
 
@@ -86,7 +86,7 @@ def check_runtime(runtime: str) -> None:
 
 
 def runtime_name(runtime: str) -> str:
-    """Name that `make_runtime` is going to give: "openvino bf16", say. Compiles nothing."""
+    """Return the name that `make_runtime` is going to give: "openvino bf16", say. Compiles nothing."""
     check_runtime(runtime)
     cuda = torch.cuda.is_available()
     precision = None if runtime == "torch" or (runtime == "auto" and cuda) else openvino_precision()
@@ -100,7 +100,7 @@ def runtime_name(runtime: str) -> str:
 
 
 def make_runtime(weights: NetworkWeights, runtime: str = "auto") -> Runtime:
-    """The network, ready to be run; OpenVINO compiles it, or reads what it compiled before.
+    """Return the network, ready to be run; OpenVINO compiles it, or reads what it compiled before.
 
     Raises:
         ConfigError: unknown runtime, or OpenVINO was asked for and cannot run this network.
@@ -120,7 +120,7 @@ def make_runtime(weights: NetworkWeights, runtime: str = "auto") -> Runtime:
 
 
 def fold_batch_norms(network: nn.Module) -> nn.Module:
-    """Convolution and batch norm that follow each other become one convolution: same function, less time."""
+    """Make one convolution of each that a batch norm follows: same function, less time."""
     for name, child in network.named_children():
         if isinstance(child, nn.Sequential):
             layers = list(child)

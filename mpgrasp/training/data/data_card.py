@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mpgrasp.statistics import wilson_interval
 from mpgrasp.exceptions import OutputError
+from mpgrasp.statistics import wilson_interval
+from mpgrasp.training.data import shards
 from mpgrasp.training.data import verification as v
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.labels import ANGLE_UNIT, DEPTH_UNIT
-from mpgrasp.training.data.views import THIN
+from mpgrasp.training.data.views import META_COLUMNS, THIN
 
 _TEXT = """\
 # Training data
@@ -23,8 +24,8 @@ Made by
     python -m mpgrasp.training generate --scenes {scenes} --seed {seed} --views {views} --out DIR{options}
 
 {n_scenes} scenes, {n_views} views. A scene is a function of the seed, its index and the format ({format})
-alone (`mpgrasp.training.generate.make_scene(seed, index)` builds it again). None of the objects is one of the
-evaluation sets', or comes close to the size of one.
+alone (`mpgrasp.training.data.views.make_scene(seed, index)` builds it again). None of the objects is one of
+the evaluation sets', or comes close to the size of one.
 
 ## Lifts
 
@@ -58,17 +59,14 @@ An `outcome` is an index into `lift_outcomes`; `quality` is the analysis's befor
 """
 
 
-def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) -> None:
-    """Write the card of finished shards.
+def write_data_card(config: GenerateConfig, made: Sequence[Path], path: Path) -> None:
+    """Write the card of the finished shards `made`.
 
     Raises:
         OutputError: it cannot be written.
     """
-    from mpgrasp.training.data.shards import FORMAT, SHARD_SCENES
-    from mpgrasp.training.data.views import META_COLUMNS
-
     trials = []
-    for shard in shards:
+    for shard in made:
         with np.load(shard) as arrays:
             trials.append(arrays["trials"])
     all_trials = np.concatenate(trials)
@@ -77,7 +75,7 @@ def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) 
         scenes=config.scenes,
         seed=config.seed,
         views=config.views,
-        format=FORMAT,
+        format=shards.FORMAT,
         options=options + ("" if config.colour else " --no-colour"),
         n_scenes=config.scenes,
         n_views=config.scenes * config.views,
@@ -87,7 +85,7 @@ def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) 
         good=v.GOOD,
         table=lift_table(all_trials),
         failures=_failures(all_trials),
-        shard_scenes=SHARD_SCENES,
+        shard_scenes=shards.SHARD_SCENES,
         depth_unit=1e3 * DEPTH_UNIT,
         colour="" if config.colour else "; not in this set (--no-colour)",
         angle_steps=round(np.pi / ANGLE_UNIT),
@@ -103,7 +101,7 @@ def write_data_card(config: GenerateConfig, shards: Sequence[Path], path: Path) 
 
 
 def lift_table(trials: np.ndarray) -> str:
-    """Markdown table of how many lifted, of what; `trials` (m, len(TRIAL_COLUMNS))."""
+    """Return a Markdown table of the shares that lifted, by group; `trials` (m, len(TRIAL_COLUMNS))."""
     told = dict(zip(v.TRIAL_COLUMNS, trials.T, strict=True))
     positive, audit = told["positive"] > 0, told["audit"] > 0
     thin = told["thickness"] < THIN

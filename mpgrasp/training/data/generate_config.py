@@ -1,21 +1,21 @@
-"""What a training set is made of: a function of this alone, whatever the number of workers."""
+"""Settings of a training set: it is a function of them alone, whatever the number of workers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mpgrasp.camera.wrist_camera import BACKENDS
+from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.exceptions import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateConfig:
-    """What is generated."""
+    """Settings of a training set."""
 
     scenes: int
     """Number of scenes."""
     seed: int = 1
-    """Of the data set; scene k of a seed is the same in every set of one format."""
+    """Seed of the data set; scene k of a seed is the same in every set of one format."""
     views: int = 4
     """Images of each scene."""
     camera: str = "auto"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps
-from mpgrasp.detectors.oracle import view_grasps
+from mpgrasp.detectors.oracle import grasps_in_view
 
 DEPTH_UNIT = 5e-5
 """Step of stored depths [m]."""
@@ -28,7 +28,7 @@ ANGLE_UNIT = np.pi / 256
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ViewLabels:
-    """What a network shall answer to one image, as it is stored."""
+    """Answer that a network shall give to one image, as it is stored."""
 
     quality: NDArray[np.uint8]
     """(H, W) in steps of `QUALITY_UNIT`."""
@@ -41,8 +41,8 @@ class ViewLabels:
 
 
 def view_labels(grasps: WorldGrasps, image: DepthFrame) -> ViewLabels:
-    """Labels of a view, from its true depth at the network's resolution."""
-    view = view_grasps(grasps, image)
+    """Return the labels of a view, from its true depth at the network's resolution."""
+    view = grasps_in_view(grasps, image)
     points = image.world_points()
     row, col, inside = grasps.height_map.cells(points[..., 0], points[..., 1])
     return ViewLabels(
@@ -54,21 +54,21 @@ def view_labels(grasps: WorldGrasps, image: DepthFrame) -> ViewLabels:
 
 
 def encode_angle(angle: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Bins of `ANGLE_UNIT` over [-pi/2, pi/2); the step above the last bin is the first, half a turn on."""
+    """Return bins of `ANGLE_UNIT` over [-pi/2, pi/2); above the last comes the first, half a turn on."""
     return (np.rint((np.asarray(angle, float) + np.pi / 2) / ANGLE_UNIT).astype(int) % 256).astype(np.uint8)
 
 
 def decode_angle(bins: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Angles [rad] of bins."""
+    """Return the angles [rad] of bins."""
     return (bins.astype(np.float32) * np.float32(ANGLE_UNIT) - np.float32(np.pi / 2)).astype(np.float32)
 
 
 def encode_depth(depth: NDArray[np.floating]) -> NDArray[np.uint16]:
-    """Steps of `DEPTH_UNIT`; 0 = no return, as is anything beyond what 16 bits hold (3.28 m)."""
+    """Return steps of `DEPTH_UNIT`; 0 = no return, as is anything beyond what 16 bits hold (3.28 m)."""
     steps = np.rint(np.nan_to_num(depth, nan=0.0) / DEPTH_UNIT)
     return np.where((steps > 0) & (steps < 65536), steps, 0).astype(np.uint16)
 
 
 def decode_depth(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Depth [m]; NaN where there was no return."""
+    """Return depth [m]; NaN where there was no return."""
     return np.where(steps > 0, steps * np.float32(DEPTH_UNIT), np.float32(np.nan)).astype(np.float32)

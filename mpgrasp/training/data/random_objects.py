@@ -12,23 +12,23 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpgrasp.suite import load_suite, suite_names
 from mpgrasp.geometry import FloatArray
-from mpgrasp.scene.objects.model import ObjectModel
-from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
-from mpgrasp.workspace import WORKSPACE_CENTRE
 from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
+from mpgrasp.scene.objects.model import ObjectModel
+from mpgrasp.suite import load_suite, suite_names
 from mpgrasp.training.data.hollow_families import HOLLOW_FAMILIES
 from mpgrasp.training.data.shapes import Family
 from mpgrasp.training.data.solid_families import SOLID_FAMILIES
 from mpgrasp.training.data.thin_families import THIN_FAMILIES
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 LONGEST = 0.2
 """Longest edge of a bounding box [m]."""
 DENSITY = (200.0, 1500.0)
-"""[kg/m^3]"""
+"""Least and greatest density of objects [kg/m^3]."""
 LIGHTEST = 0.001
-"""[kg]"""
+"""Least mass of an object [kg]."""
 LIKENESS = 0.15
 """A box whose three edges all lie within this share of an evaluation object's is drawn again."""
 THIN_SCENES = 0.5
@@ -44,7 +44,7 @@ STACK_HEIGHT = 4
 
 
 def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectModel:
-    """A random object: a box, stick, plate, disc, ring, letter, stack, hull ...
+    """Draw an object: a box, stick, plate, disc, ring, letter, stack, hull ...
 
     Args:
         rng: source of all that is random.
@@ -69,7 +69,7 @@ def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectMode
 
 
 def training_scene_config(rng: np.random.Generator) -> SceneConfig:
-    """A random training scene: 1 to 10 objects, half of the scenes with thin objects alone."""
+    """Draw a training scene: 1 to 10 objects, half of the scenes with thin objects alone."""
     thin_alone = rng.random() < THIN_SCENES
     thin_share = 1.0 if thin_alone else 0.15
     n = 1 + min(rng.geometric(0.3) - 1, 9)
@@ -100,14 +100,14 @@ def training_scene_config(rng: np.random.Generator) -> SceneConfig:
 
 
 def resembles_evaluation_object(size: ArrayLike) -> bool:
-    """Whether all three edges `size` [m], however turned, lie within `LIKENESS` of an evaluation object's."""
+    """True if all three edges `size` [m], however turned, lie within `LIKENESS` of an evaluation object's."""
     ratio = np.sort(np.asarray(size, float)) / _evaluation_sizes()
     return bool((np.abs(ratio - 1) < LIKENESS).all(axis=1).any())
 
 
 @cache
 def _evaluation_sizes() -> FloatArray:
-    """(n, 3) sorted edges of the bounding boxes of the catalogue's and all shipped suites' objects [m].
+    """Return sorted edges (n, 3) of the boxes around the catalogue's and all shipped suites' objects [m].
 
     What a seed means depends on them: where they change, `shards.FORMAT` has to be counted up.
     """

@@ -34,7 +34,7 @@ def box(size: ArrayLike, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
 
 
 def thickness(rng: np.random.Generator) -> float:
-    """Of a thin object [m]; half of them within the lower 3 mm to 7 mm, where the trouble is."""
+    """Height of a thin object [m]; half of them within the lower 3 mm to 7 mm, where the trouble is."""
     low, high = THIN_HEIGHT
     return float(low + (high - low) * rng.beta(1.3, 1.9))
 
@@ -63,10 +63,12 @@ def letter(rng: np.random.Generator, height: float, width: float, length: float)
 
 
 def polygon(rng: np.random.Generator) -> FloatArray:
-    """(n, 2) corners in the unit circle, 3 to 8 of them, spread around the centre."""
+    """Draw corners (n, 2) in the unit circle, 3 to 8 of them, spread around the centre."""
     n = int(rng.integers(3, 9))
     angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
-    return rng.uniform(0.75, 1.0, n)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    radii = rng.uniform(0.75, 1.0, n)
+    corners: FloatArray = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return corners
 
 
 def shell(outer: ArrayLike, inner: ArrayLike, n: int, turn: float = 2 * np.pi) -> list[Part]:

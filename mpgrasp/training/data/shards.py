@@ -12,15 +12,15 @@ import numpy as np
 
 from mpgrasp.depth import CROP, NETWORK_SIZE
 from mpgrasp.exceptions import ConfigError, OutputError
-from mpgrasp.files.json_values import difference
 from mpgrasp.files.atomic import replace_file
+from mpgrasp.files.json_values import difference
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.labels import ANGLE_UNIT, DEPTH_UNIT, QUALITY_UNIT
 from mpgrasp.training.data.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMNS
 from mpgrasp.training.data.views import META_COLUMNS
 
 FORMAT = 3
-"""Of shards and `meta.json`, and of what a seed means: a scene is a function of the seed, its index and this.
+"""Format of shards and `meta.json`, and of a seed's scenes: each is a function of seed, index and format.
 
 When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do
 not show. An object that joins the catalogue or a shipped suite is enough, for training keeps away from it."""
@@ -29,7 +29,7 @@ SHARD_SCENES = 20
 
 
 def describe(config: GenerateConfig) -> dict[str, object]:
-    """What `meta.json` says."""
+    """Return the content of `meta.json`."""
     return {
         "format": FORMAT,
         "seed": config.seed,
@@ -77,12 +77,12 @@ def prepare(config: GenerateConfig, out: Path) -> None:
 
 
 def shard_path(out: Path, first_scene: int) -> Path:
-    """Where the shard lies that begins with that scene."""
+    """Return the path of the shard that begins with that scene."""
     return out / f"shard_{first_scene // SHARD_SCENES:05d}.npz"
 
 
 def planned(config: GenerateConfig, out: Path) -> dict[Path, range]:
-    """Paths of all shards of the set, and the scenes in each."""
+    """Return the paths of all shards of the set, and the scenes in each."""
     return {
         shard_path(out, first): range(first, min(first + SHARD_SCENES, config.scenes))
         for first in range(0, config.scenes, SHARD_SCENES)
@@ -90,7 +90,7 @@ def planned(config: GenerateConfig, out: Path) -> dict[Path, range]:
 
 
 def unfinished(config: GenerateConfig, out: Path) -> dict[Path, range]:
-    """Those planned shards that are not there with exactly their scenes; an unreadable one is not there.
+    """Return planned shards that are not there with exactly their scenes; an unreadable one is not there.
 
     Raises:
         ConfigError: the directory holds scenes beyond the last, which training would read too.
@@ -112,7 +112,7 @@ def unfinished(config: GenerateConfig, out: Path) -> dict[Path, range]:
 
 
 def _scenes(path: Path) -> list[int]:
-    """The scene that each row of a shard shows; none where it cannot be read."""
+    """Return the scene that each row of a shard shows; none where it cannot be read."""
     try:
         with np.load(path) as arrays:
             scenes: list[int] = arrays["meta"][:, META_COLUMNS.index("scene")].astype(int).tolist()
@@ -122,7 +122,7 @@ def _scenes(path: Path) -> list[int]:
 
 
 def write_shard(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """An npz file, packed fast, whose bytes depend on the arrays alone; there at once, or not at all.
+    """Write an npz file, packed fast, whose bytes depend on the arrays alone; at once, or not at all.
 
     Raises:
         OutputError: it cannot be written.

@@ -48,7 +48,7 @@ def write_sheet(shard: Path, path: Path) -> None:
 
 
 def _tile(view: dict[str, np.ndarray], trials: np.ndarray) -> np.ndarray:
-    """(H, 3 W, 3) BGR picture of one view; (H, 2 W, 3) without colour."""
+    """Draw one view as a BGR picture (H, 3 W, 3); (H, 2 W, 3) without colour."""
     depth_picture = _depth_picture(decode_depth(view["depth"]))
     quality = view["quality"] * np.float32(QUALITY_UNIT)
     quality_picture = _coloured(quality, cv2.COLORMAP_VIRIDIS)
@@ -81,7 +81,7 @@ def _tile(view: dict[str, np.ndarray], trials: np.ndarray) -> np.ndarray:
 
 
 def _rectangle(meta: np.ndarray, told: dict[str, float]) -> GraspRectangle:
-    """Where a trial's grasp lies in a view."""
+    """Return the rectangle of a trial's grasp in a view."""
     T, intrinsics = stored_pose(meta), stored_intrinsics()
     point = transform_points(invert(T), np.array([told["x"], told["y"], told["z"]]))
     u, v = intrinsics.project(point)
@@ -97,7 +97,7 @@ def _rectangle(meta: np.ndarray, told: dict[str, float]) -> GraspRectangle:
 def _draw(
     picture: np.ndarray, rectangle: GraspRectangle, colour: tuple[int, int, int], *, jaws: bool = True
 ) -> None:
-    """Both jaws of a grasp and a thin line between them."""
+    """Draw both jaws of a grasp and a thin line between them."""
     a, b, c, d = np.clip(np.rint(rectangle.corners()), -2000, 2000).astype(np.int32).tolist()
     if jaws:
         cv2.line(picture, a, b, colour, 1, cv2.LINE_AA)

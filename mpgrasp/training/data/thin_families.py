@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from mpgrasp.scene.objects.model import Part
-from mpgrasp.training.data.shapes import LYING, Family, bar, box, letter, open_box, polygon, ring, shell, thickness
+from mpgrasp.training.data.shapes import (
+    LYING,
+    Family,
+    bar,
+    box,
+    letter,
+    open_box,
+    polygon,
+    ring,
+    shell,
+    thickness,
+)
 
 
 def _thin_plate(rng: np.random.Generator) -> list[Part]:

@@ -19,6 +19,7 @@ from mpgrasp.geometry import FloatArray, line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.height_map import HeightMap
 from mpgrasp.motion.lift_trial import LiftRig
+from mpgrasp.outcome import Outcome
 from mpgrasp.scene.scene import Scene
 
 TRIAL_COLUMNS = (
@@ -29,7 +30,8 @@ TRIAL_COLUMNS = (
 direction about world z [rad] and opening [m]; analytic quality before verification; 1 for a grasp that the
 analysis has, 0 for one that it excludes; 1 for an audit of the shipped labels; 1 if it lifted; quality as
 shipped; how high the object rises over the cloth [m]; index into `LIFT_OUTCOMES`."""
-LIFT_OUTCOMES = ("success", "collision", "missed", "slipped")
+LIFT_OUTCOMES = (Outcome.SUCCESS, Outcome.COLLISION, Outcome.MISSED, Outcome.SLIPPED)
+"""Outcomes of a lift in the order of their index in shards."""
 POSITIVES = 4
 """Lifts of analytic grasps per scene."""
 NEGATIVES = 1
@@ -45,20 +47,20 @@ SPREAD = 0.0075
 ANGLE_SPREAD = np.deg2rad(20.0)
 """... and in angle [rad]."""
 PRIOR_LIFTS = 0.25
-"""What the analysis counts against a lift at the very same place."""
+"""Weight of the analysis against one lift at the very same place."""
 WIDE_OPEN = 0.070
 """Opening of grasps that the analysis excludes; the execution adds its margin [m]."""
 
-Lift = Callable[[Grasp], str]
+Lift = Callable[[Grasp], Outcome]
 """Tries a grasp in the settled scene; one of `LIFT_OUTCOMES`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Verified:
-    """What is left of the analysis after the lifts, and their record."""
+    """The analysis after the lifts have corrected it, and their record."""
 
     grasps: WorldGrasps
-    """With corrected quality."""
+    """The grasps with corrected quality."""
     trials: NDArray[np.float32]
     """(m, len(TRIAL_COLUMNS))"""
 
@@ -69,12 +71,12 @@ class _Trial:
     col: int
     grasp: Grasp
     positive: bool
-    outcome: str
+    outcome: Outcome
     audit: bool = False
 
     @property
     def lifted(self) -> bool:
-        return self.outcome == LIFT_OUTCOMES[0]
+        return self.outcome == Outcome.SUCCESS
 
 
 def verify(
@@ -92,8 +94,8 @@ def verify(
     if lift is None:
         rig = LiftRig(scene)
 
-        def lift(grasp: Grasp) -> str:
-            return rig.attempt(grasp).outcome
+        def lift(grasp: Grasp) -> Outcome:
+            return Outcome(rig.attempt(grasp).outcome)
 
     truth = grasps.height_map
     trials = []
@@ -123,7 +125,7 @@ def verify(
 
 
 def corrected(grasps: WorldGrasps, trials: list[_Trial]) -> WorldGrasps:
-    """The same grasps, their quality lowered to what the lifts near them leave of it."""
+    """Return the grasps with their quality lowered to what the lifts near them leave of it."""
     quality, truth = grasps.quality, grasps.height_map
     lifted, lost = np.zeros_like(quality), np.zeros_like(quality)
     for t in trials:
@@ -138,7 +140,7 @@ def corrected(grasps: WorldGrasps, trials: list[_Trial]) -> WorldGrasps:
 
 
 def draw_positives(grasps: WorldGrasps, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """Cells (row, col) with a grasp, spread over the objects and over the range of quality."""
+    """Draw cells (row, col) with a grasp, spread over the objects and over the range of quality."""
     label, quality = grasps.height_map.label, grasps.quality
     objects = np.unique(label[quality > 0])
     if not len(objects):
@@ -158,7 +160,7 @@ def draw_positives(grasps: WorldGrasps, rng: np.random.Generator) -> list[tuple[
 
 
 def draw_negatives(truth: HeightMap, rng: np.random.Generator) -> list[tuple[int, int, float]]:
-    """Cells (row, col) on objects, and angles [rad] at which the analysis has no grasp there."""
+    """Draw cells (row, col) on objects, and angles [rad] at which the analysis has no grasp there."""
     drawn = []
     for _ in range(NEGATIVES):
         angle = float(rng.uniform(-np.pi / 2, np.pi / 2))
@@ -172,7 +174,7 @@ def draw_negatives(truth: HeightMap, rng: np.random.Generator) -> list[tuple[int
 def draw_audits(
     shipped: WorldGrasps, tried: set[tuple[int, int]], rng: np.random.Generator
 ) -> list[tuple[int, int]]:
-    """Cells (row, col) of shipped quality `GOOD` or better that were not lifted before, any object alike."""
+    """Draw cells (row, col) of shipped quality `GOOD` or better that were not lifted, any object alike."""
     fresh = shipped.quality >= GOOD
     for cell in tried:
         fresh[cell] = False
@@ -191,7 +193,7 @@ def _any_cell(mask: np.ndarray, rng: np.random.Generator) -> tuple[int, int]:
 
 
 def _point(truth: HeightMap, row: int, col: int) -> FloatArray:
-    """(3,) point of the surface [m]."""
+    """Return the point (3,) of the surface [m]."""
     return np.array([truth.x0 + col * truth.cell, truth.y0 + row * truth.cell, float(truth.height[row, col])])
 
 
@@ -205,7 +207,7 @@ def _grasp_at(grasps: WorldGrasps, row: int, col: int) -> Grasp:
 
 
 def _object_heights(truth: HeightMap) -> FloatArray:
-    """(n_labels,) by label: how high each object rises over the cloth [m]."""
+    """Return the height (n_labels,) by label to which each object rises over the cloth [m]."""
     heights = np.zeros(int(truth.label.max()) + 1)
     np.maximum.at(heights, truth.label, truth.height - truth.support)
     return heights

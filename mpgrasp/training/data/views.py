@@ -15,13 +15,13 @@ from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down, rotation_x, rotation_z, transform
 from mpgrasp.height_map import HeightMap
-from mpgrasp.workspace import WORKSPACE_CENTRE
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.training.data.appearance import randomise_appearance
 from mpgrasp.training.data.generate_config import GenerateConfig
 from mpgrasp.training.data.labels import QUALITY_UNIT, encode_depth, view_labels
 from mpgrasp.training.data.random_objects import training_scene_config
 from mpgrasp.training.data.verification import verify
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 META_COLUMNS = (
     "camera_height", "scene", "max_thickness", "n_objects", "thin", "cloth_unevenness", "best_quality",
@@ -47,7 +47,7 @@ _LOOK, _LIFTS = 1, 2  # streams of a scene beside the one for shapes and views
 
 
 def make_scene(seed: int, index: int) -> tuple[Scene, np.random.Generator]:
-    """Scene `index` of the data set `seed`, with its light and colours, and the generator for its views."""
+    """Build scene `index` of the data set `seed`, with light and colours, and the generator for its views."""
     rng = np.random.default_rng([seed, index])
     for _ in range(20):
         scene_config, scene_seed = training_scene_config(rng), int(rng.integers(2**31))
@@ -61,7 +61,7 @@ def make_scene(seed: int, index: int) -> tuple[Scene, np.random.Generator]:
 
 
 def make_views(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
-    """Arrays of one shard's rows for one scene: (views, ...), and `trials` (m, ...)."""
+    """Return arrays of one shard's rows for one scene: (views, ...), and `trials` (m, ...)."""
     scene, rng = make_scene(config.seed, index)
     truth = scene.height_map()
     verified = verify(
@@ -96,7 +96,7 @@ def make_views(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
 
 
 def camera_pose(truth: HeightMap, rng: np.random.Generator) -> FloatArray:
-    """`T_world_camera` (4, 4): anywhere between z_min and z_max, mostly with an object in view, any yaw."""
+    """Draw `T_world_camera` (4, 4) anywhere between z_min and z_max, mostly with an object in sight."""
     height = rng.uniform(*CAMERA_HEIGHT)
     half_view = height * CROP / 2 / D435_INTRINSICS.fx
     label = rng.choice(np.unique(truth.label[truth.label > 0])) if truth.label.any() else 0
@@ -116,12 +116,12 @@ def camera_pose(truth: HeightMap, rng: np.random.Generator) -> FloatArray:
 
 
 def stored_pose(meta: ArrayLike, columns: Sequence[str] = META_COLUMNS) -> FloatArray:
-    """`T_world_camera` (4, 4) of a view, from its row of `meta`."""
+    """Return `T_world_camera` (4, 4) of a view, from its row of `meta`."""
     value = dict(zip(columns, np.asarray(meta, float), strict=True))
     turn = np.array([value[f"turn_{axis}"] for axis in "xyz"])
     return transform(cv2.Rodrigues(turn)[0], [value["camera_x"], value["camera_y"], value["camera_height"]])
 
 
 def stored_intrinsics() -> CameraIntrinsics:
-    """Intrinsics of the images in shards."""
+    """Return the intrinsics of the images in shards."""
     return D435_INTRINSICS.centre_crop(CROP).resize(NETWORK_SIZE, NETWORK_SIZE)

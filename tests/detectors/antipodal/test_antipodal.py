@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from height_maps import Solid, height_map
 
-from mpgrasp.detectors.antipodal.analysis import HandGeometry, WorldGrasps, antipodal_grasps, quality_along
+from mpgrasp.detectors.antipodal.analysis import WorldGrasps, antipodal_grasps, quality_along
+from mpgrasp.detectors.antipodal.hand import HandGeometry
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference
 

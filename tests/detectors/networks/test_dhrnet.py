@@ -36,8 +36,8 @@ def test_the_authors_settings_have_the_authors_size() -> None:
 
 def test_the_four_stages_have_one_to_four_branches_of_doubled_width() -> None:
     network = DHRNet(DHRNetConfig(**SMALL))
-    assert [len(stage[0].branches) for stage in network.stages] == [2, 3, 4]  # type: ignore[index,union-attr]
-    widths = [branch[0].body[0].weight.shape[0] for branch in network.stages[-1][0].branches]  # type: ignore[index,union-attr]
+    assert [len(stage[0].branches) for stage in network.stages] == [2, 3, 4]  # type: ignore[index]
+    widths = [branch[0].body[0].weight.shape[0] for branch in network.stages[-1][0].branches]  # type: ignore[index]
     assert widths == [4, 8, 16, 32]
 
 
@@ -93,7 +93,7 @@ def test_without_the_finest_branch_maps_are_no_finer_than_an_eighth() -> None:
 @pytest.mark.parametrize(
     "bad", [{"width": 0}, {"modules": (1, 1)}, {"blocks": 0}, {"channels": 0}, {"head": "upper"}]
 )
-def test_settings_that_make_no_network_are_refused(bad: dict) -> None:
+def test_settings_that_make_no_network_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         DHRNetConfig(**bad)
 

@@ -81,7 +81,7 @@ def test_attention_in_a_window_is_softmax_of_scaled_products_plus_position_bias(
 def test_each_relative_position_has_its_own_bias() -> None:
     offsets = _offsets(7)
     assert offsets.shape == (49, 49)
-    assert offsets.unique().tolist() == list(range(13**2))
+    assert torch.unique(offsets).tolist() == list(range(13**2))
     assert (offsets.diagonal() == 13**2 // 2).all()
 
 
@@ -116,7 +116,7 @@ def test_stochastic_depth_is_for_training_alone_and_keeps_the_mean() -> None:
     ones = torch.ones(4000, 1, 1, 1)
     torch.manual_seed(0)
     kept = block.train()._kept(ones)
-    assert kept.unique().tolist() == [0.0, 2.0]
+    assert torch.unique(kept).tolist() == [0.0, 2.0]
     assert kept.mean() == pytest.approx(1.0, abs=0.05)
     assert torch.equal(block.eval()._kept(ones), ones)
 
@@ -128,6 +128,6 @@ def test_masks_and_indices_are_no_weights() -> None:
 @pytest.mark.parametrize(
     "bad", [{"size": 100}, {"heads": (3, 6, 12, 24)}, {"depths": (2, 2)}, {"drop_path": 1.0}, {"window": 0}]
 )
-def test_settings_that_make_no_network_are_refused(bad: dict) -> None:
+def test_settings_that_make_no_network_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         TFGraspConfig(**{**SMALL, **bad})

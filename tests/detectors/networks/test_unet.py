@@ -1,4 +1,4 @@
-"""What the U-Net joins."""
+"""Laws of the U-Net's skip connections."""
 
 from __future__ import annotations
 

@@ -10,9 +10,9 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.detectors.networks.weights import (
     NetworkWeights,
-    build_network,
     load_weights,
     read_card,
     save_weights,
@@ -188,8 +188,8 @@ def test_weights_that_are_not_finite_are_refused(tmp_path: Path) -> None:
 
 def test_a_pickle_that_would_run_code_does_not(tmp_path: Path) -> None:
     class Evil:
-        def __reduce__(self) -> tuple:
-            return (Path.touch, (tmp_path / "ran",))
+        def __reduce__(self) -> tuple[object, tuple[Path]]:
+            return Path.touch, (tmp_path / "ran",)
 
     torch.save({"conv1.weight": Evil()}, tmp_path / "w.pt")
     with pytest.raises(WeightsError):

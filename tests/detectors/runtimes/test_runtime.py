@@ -18,7 +18,8 @@ from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.detectors.__main__ import make_parser
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.weights import NetworkWeights, build_network, default_weights, load_weights
+from mpgrasp.detectors.networks.registry import build_network
+from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
 from mpgrasp.detectors.runtimes import openvino as openvino_runtime
 from mpgrasp.detectors.runtimes import runtime as runtimes
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision

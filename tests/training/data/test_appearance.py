@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import OBJECT_GROUP
 from mpgrasp.scene.scene import Scene, build_scene
-from mpgrasp.scene.config import SceneConfig
 from mpgrasp.training.data.appearance import CAMOUFLAGE, randomise_appearance
 
 CONFIG = SceneConfig(objects=("usb_stick", "key"), half_extent=0.15)

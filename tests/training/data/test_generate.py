@@ -20,12 +20,20 @@ from mpgrasp.camera import rasteriser
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps
 from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError, OutputError
 from mpgrasp.geometry import invert, transform_points
-from mpgrasp.training import generate as generating
-from mpgrasp.training.data import shards, views
 from mpgrasp.training.__main__ import main
-from mpgrasp.training.generate import GenerateConfig, Job, generate, make_scene, make_views
+from mpgrasp.training.data import generation, shards, views
+from mpgrasp.training.data.generate_config import GenerateConfig
+from mpgrasp.training.data.generation import Job, generate
 from mpgrasp.training.data.verification import GOOD, TRIAL_COLUMNS, Verified
-from mpgrasp.training.data.views import CAMERA_HEIGHT, META_COLUMNS, camera_pose, stored_intrinsics, stored_pose
+from mpgrasp.training.data.views import (
+    CAMERA_HEIGHT,
+    META_COLUMNS,
+    camera_pose,
+    make_scene,
+    make_views,
+    stored_intrinsics,
+    stored_pose,
+)
 
 CONFIG = GenerateConfig(scenes=2, seed=0, views=2, camera="ray", colour=False)
 try:
@@ -208,11 +216,11 @@ def test_a_killed_worker_is_one_clear_error_and_the_same_command_goes_on(
     made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shards, "SHARD_SCENES", 1)
-    monkeypatch.setattr(generating, "_write_shard", partial(copied_until_killed, made))
+    monkeypatch.setattr(generation, "_write_shard", partial(copied_until_killed, made))
     with pytest.raises(MpgraspError, match=r"worker process was killed.*finished shards are kept"):
         generate(CONFIG, tmp_path, workers=2, progress=False)
     assert [path.name for path in tmp_path.glob("shard_*")] == ["shard_00000.npz"]
-    monkeypatch.setattr(generating, "_write_shard", partial(copied, made))
+    monkeypatch.setattr(generation, "_write_shard", partial(copied, made))
     assert digests(generate(CONFIG, tmp_path, workers=2, progress=False)) == digests(made)
 
 

@@ -10,7 +10,15 @@ from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.geometry import line_angle_difference, looking_down, transform_points
 from mpgrasp.grasp import image_to_world_angle
-from mpgrasp.training.data.labels import ANGLE_UNIT, DEPTH_UNIT, decode_angle, decode_depth, encode_angle, encode_depth, view_labels
+from mpgrasp.training.data.labels import (
+    ANGLE_UNIT,
+    DEPTH_UNIT,
+    decode_angle,
+    decode_depth,
+    encode_angle,
+    encode_depth,
+    view_labels,
+)
 
 STICK = Solid(x=0.51, y=0.02, yaw=-0.5, length=0.09, breadth=0.024, height=0.02)
 

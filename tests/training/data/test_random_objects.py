@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
+from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.training.data.hollow_families import HOLLOW_FAMILIES
-from mpgrasp.training.data.random_objects import LIKENESS, _evaluation_sizes, random_object, resembles_evaluation_object, training_scene_config
+from mpgrasp.training.data.random_objects import (
+    LIKENESS,
+    _evaluation_sizes,
+    random_object,
+    resembles_evaluation_object,
+    training_scene_config,
+)
 from mpgrasp.training.data.shapes import Family
 from mpgrasp.training.data.shards import FORMAT
 from mpgrasp.training.data.solid_families import SOLID_FAMILIES
@@ -18,7 +24,7 @@ from mpgrasp.training.data.thin_families import THIN_FAMILIES
 
 NAMES = [name for names in OBJECT_SETS.values() for name in names]
 STICKS = [(0.060, 0.018, mm / 1000) for mm in (2, 3, 4, 5, 6, 8, 10, 12)]
-"""Of the study of thickness, which no catalogue holds."""
+"""Object of the study of thickness, which no catalogue holds."""
 
 
 def test_no_training_object_is_within_reach_of_an_evaluation_object() -> None:

@@ -9,11 +9,19 @@ from height_maps import Solid, height_map
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps, antipodal_grasps
 from mpgrasp.geometry import line_angle_difference
 from mpgrasp.grasp import Grasp
+from mpgrasp.outcome import Outcome
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.training.data import verification as v
 from mpgrasp.training.data.data_card import lift_table
-from mpgrasp.training.data.verification import GOOD, TRIAL_COLUMNS, Verified, draw_negatives, draw_positives, verify
+from mpgrasp.training.data.verification import (
+    GOOD,
+    TRIAL_COLUMNS,
+    Verified,
+    draw_negatives,
+    draw_positives,
+    verify,
+)
 
 STICKS = (
     Solid(x=0.50, y=0.02, yaw=0.3, length=0.12, breadth=0.02, height=0.02),
@@ -26,7 +34,7 @@ def grasps() -> WorldGrasps:
     return antipodal_grasps(height_map(*STICKS))
 
 
-def lifted_by(outcome: str, grasps: WorldGrasps, seed: int = 0) -> Verified:
+def lifted_by(outcome: Outcome, grasps: WorldGrasps, seed: int = 0) -> Verified:
     return verify(None, grasps, np.random.default_rng(seed), index=7, lift=lambda grasp: outcome)  # type: ignore[arg-type]
 
 
@@ -35,7 +43,7 @@ def columns(verified: Verified) -> dict[str, np.ndarray]:
 
 
 def test_what_lifts_leaves_the_labels_as_they_were(grasps: WorldGrasps) -> None:
-    verified = lifted_by("success", grasps)
+    verified = lifted_by(Outcome.SUCCESS, grasps)
     assert np.array_equal(verified.grasps.quality, grasps.quality)
     told = columns(verified)
     assert told["lifted"].all()
@@ -46,7 +54,7 @@ def test_what_fails_lowers_the_labels_around_it_and_nothing_else(grasps: WorldGr
     truth = grasps.height_map
     row, col = map(int, np.unravel_index(grasps.quality.argmax(), grasps.quality.shape))
     grasp = v._grasp_at(grasps, row, col)
-    lost = v._Trial(row=row, col=col, grasp=grasp, positive=True, outcome="slipped")
+    lost = v._Trial(row=row, col=col, grasp=grasp, positive=True, outcome=Outcome.SLIPPED)
     after = v.corrected(grasps, [lost]).quality
     assert after[row, col] < 0.25 * grasps.quality[row, col]
     rows, cols = np.indices(after.shape)
@@ -65,7 +73,7 @@ def test_a_lift_nearby_protects_a_label_from_a_failure(grasps: WorldGrasps) -> N
     grasp = v._grasp_at(grasps, row, col)
     lost, won = (
         v._Trial(row=row, col=col, grasp=grasp, positive=True, outcome=outcome)
-        for outcome in ("missed", "success")
+        for outcome in (Outcome.MISSED, Outcome.SUCCESS)
     )
     alone, both = (v.corrected(grasps, trials).quality[row, col] for trials in ([lost], [lost, won]))
     assert alone < both < grasps.quality[row, col]
@@ -99,7 +107,7 @@ def test_negatives_lie_on_objects_where_nothing_closes_along_their_angle(grasps:
 
 def test_audits_are_fresh_and_good(grasps: WorldGrasps) -> None:
     for seed in range(5):
-        told = columns(lifted_by("success", grasps, seed))
+        told = columns(lifted_by(Outcome.SUCCESS, grasps, seed))
         audit = told["audit"] > 0
         assert audit.sum() == v.AUDITS
         assert np.all(told["shipped"][audit] >= GOOD)
@@ -108,16 +116,16 @@ def test_audits_are_fresh_and_good(grasps: WorldGrasps) -> None:
 
 
 def test_nothing_is_drawn_where_nothing_lies() -> None:
-    verified = lifted_by("success", antipodal_grasps(height_map()))
+    verified = lifted_by(Outcome.SUCCESS, antipodal_grasps(height_map()))
     assert verified.trials.shape == (0, len(TRIAL_COLUMNS))
 
 
 def test_the_record_says_what_was_tried(grasps: WorldGrasps) -> None:
     tried: list[Grasp] = []
 
-    def lift(grasp: Grasp) -> str:
+    def lift(grasp: Grasp) -> Outcome:
         tried.append(grasp)
-        return "missed"
+        return Outcome.MISSED
 
     verified = verify(None, grasps, np.random.default_rng(0), index=7, lift=lift)  # type: ignore[arg-type]
     told = columns(verified)

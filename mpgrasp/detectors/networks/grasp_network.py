@@ -1,4 +1,4 @@
-"""What the convolutional grasp networks have in common: their heads, their layers and how they begin."""
+"""Base of the convolutional grasp networks: four heads, first weights, convolutions with batch norm."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.registry import HEADS
+from mpgrasp.detectors.networks.declaration import HEADS
 
 BN_MOMENTUM = 0.1
 """The paper's Section IV-A."""
@@ -29,22 +29,22 @@ class GraspNetwork(nn.Module):
             nn.init.normal_(getattr(self, f"{name}_output").weight, std=HEAD_STD)
 
     def maps(self, features: Tensor, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Quality, cosine, sine and width, (n, 1, H, W) each, of features (n, f, h, w) for an image x."""
+        """Return the four heads, (n, 1, H, W) each, of features (n, f, h, w) for an image x."""
         heads = [getattr(self, f"{name}_output") for name in HEADS]
         # one convolution instead of four saves a tenth of a training step
         weight, bias = torch.cat([h.weight for h in heads]), torch.cat([h.bias for h in heads])
         coarse = F.conv2d(features, weight, bias).float()
-        pos, cos, sin, width = resize(coarse, x).split(1, dim=1)  # of (n, 4, H, W)
+        pos, cos, sin, width = torch.split(resize(coarse, x), 1, dim=1)  # of (n, 4, H, W)
         return pos, cos, sin, width
 
 
 def resize(x: Tensor, like: Tensor) -> Tensor:
-    """Bilinear resizing to the height and width of another tensor."""
+    """Resize, bilinearly, to the height and width of another tensor."""
     return F.interpolate(x, size=like.shape[-2:], mode="bilinear", align_corners=False)
 
 
 def conv_bn(inputs: int, outputs: int, kernel: int, *, stride: int = 1, relu: bool = True) -> nn.Sequential:
-    """Convolution that keeps the size (up to its stride), batch norm and, on request, ReLU."""
+    """Return a convolution that keeps the size (up to its stride), batch norm and, on request, ReLU."""
     layers: list[nn.Module] = [
         nn.Conv2d(inputs, outputs, kernel, stride=stride, padding=kernel // 2, bias=False),
         nn.BatchNorm2d(outputs, momentum=BN_MOMENTUM),

@@ -19,11 +19,11 @@ LEVEL_STEP = 0.008
 ANGLE_TOLERANCE = np.deg2rad(10.0)
 """Misalignment of the edges that halves a grasp's worth, roughly; the object would be turned [rad]."""
 OFFSET_TOLERANCE = 0.004
-"""Likewise the offset of the centre from the middle between the contacts [m]."""
+"""Offset of the centre from the middle between the contacts that halves the worth likewise [m]."""
 UNEVENNESS_TOLERANCE = 0.003
-"""Likewise how far the pads' first contact stands out of the mean edge [m]."""
+"""Distance by which the first contact stands out of the mean edge that halves it likewise [m]."""
 ARM_TOLERANCE = 0.025
-"""Likewise the distance of the grasp from the object's centre of mass [m]."""
+"""Distance of the grasp from the object's centre of mass that halves it likewise [m]."""
 SLANT = np.deg2rad(5.0)
 """Misalignment that the fit of the edges makes good afterwards [rad]."""
 FULL_CONTACT = 0.012
@@ -34,7 +34,7 @@ LANDING = 0.6
 """Worth of a grasp whose tips stop on something other than the support."""
 
 
-class TurnedView:
+class TurnedMap:
     """A height map whose rows run along the closing direction; lengths are in cells unless [m] is said."""
 
     def __init__(
@@ -69,11 +69,11 @@ class TurnedView:
         self.rows = (np.arange(n_rows, dtype=np.float32) - n_rows / 2)[:, None]
 
     def levels(self) -> list[float]:
-        """Tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
+        """Return tip heights [m] to try, from the cloth up; the lowest stands for the cloth itself."""
         return [0.0, *np.arange(LEVEL_STEP, self.top - 0.004, LEVEL_STEP)] if self.top > 0.014 else [0.0]
 
-    def around(self, level: float) -> tuple[TurnedView | None, tuple[slice, slice]]:
-        """This view cut down to what matters at a tip height, and where that lies; None = nothing there."""
+    def around(self, level: float) -> tuple[TurnedMap | None, tuple[slice, slice]]:
+        """Return this map cut down to what matters at a tip height, and its place; None = nothing there."""
         occupied = (self.label > 0) & (self.height > level) if level > 0 else self.label > 0
         rows, cols = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))
         if not len(rows):
@@ -179,7 +179,7 @@ class TurnedView:
         result[r[better], c[better]] = np.column_stack([q, opening, edges.turn])[better]
 
     def _runs(self, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First and last column (h, w) of the row-wise run of `mask` that holds each cell."""
+        """Return the first and last column (h, w) of the row-wise run of `mask` that holds each cell."""
         n = mask.shape[1]
         padded = np.pad(mask, ((0, 0), (1, 1)))
         starts = mask & ~padded[:, :-2]
@@ -189,16 +189,17 @@ class TurnedView:
         return first, last
 
     def _free(self, mask: np.ndarray, r: np.ndarray, a: np.ndarray, b: np.ndarray) -> FloatArray:
-        """Free length [m] beside columns a and b of rows r, the lesser of both sides."""
+        """Return the free length [m] beside columns a and b of rows r, the lesser of both sides."""
         n = mask.shape[1]
         before = np.maximum.accumulate(np.where(mask, self.columns, -n), axis=1)
         after = np.minimum.accumulate(np.where(mask, self.columns, 2 * n)[:, ::-1], axis=1)[:, ::-1]
         left = np.where(a > 0, a - 1 - before[r, np.maximum(a - 1, 0)], n)
         right = np.where(b < n - 1, after[r, np.minimum(b + 1, n - 1)] - b - 1, n)
-        return np.minimum(left, right) * self.cell
+        free: FloatArray = np.minimum(left, right) * self.cell
+        return free
 
     def _edges(self, solid: np.ndarray, on_cloth: bool, r: np.ndarray, c: np.ndarray) -> _Edges:
-        """Straight lines through both edges of the runs within the pad's width around cells (r, c)."""
+        """Fit straight lines to both edges of the runs within the pad's width around cells (r, c)."""
         n_columns = solid.shape[1]
         first, last = self._runs(solid > 0)
         mask = (solid > 0).astype(np.float32)
@@ -242,7 +243,7 @@ class TurnedView:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Edges:
-    """What both pads meet, for n candidates; all (n,)."""
+    """Edges that both pads meet, for n candidates; all (n,)."""
 
     length: FloatArray  # of contact across the closing direction [m]
     height: FloatArray  # of the lower of both edges [m]
@@ -254,14 +255,15 @@ class _Edges:
 
 
 def _bell(x: FloatArray) -> FloatArray:
-    return np.exp(-0.5 * x * x)
+    bell: FloatArray = np.exp(-0.5 * x * x)
+    return bell
 
 
 def odd(cells: float) -> int:
-    """Nearest odd whole number, so that a filter has a centre."""
+    """Return the nearest odd whole number, so that a filter has a centre."""
     return max(2 * round((cells - 1) / 2) + 1, 1)
 
 
 def _highest(height: Float32, rows: int, cols: int) -> Float32:
-    """Greatest height in a window of (rows, cols) around each cell."""
+    """Return the greatest height in a window of (rows, cols) around each cell."""
     return np.asarray(cv2.dilate(height, np.ones((rows, cols), np.uint8)))

@@ -1,6 +1,6 @@
-"""What detectors look at: the central square of a frame, and whether there is anything to be seen in it.
+"""Central square of a frame, which all detectors look at, and a test of whether it holds any information.
 
-All of them judge that alike, so that an image without information has no grasp, whoever is asked.
+All detectors share that test, so that an image without information has no grasp, whichever is asked.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ MIN_RELIEF = 1e-4
 """Least difference between depths; with less the image says nothing [m]."""
 
 
-def square_view(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -> DepthFrame:
-    """The frame's central square of `crop` px, or as far as it goes, resized to `size` px.
+def central_square(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -> DepthFrame:
+    """Return the frame's central square of `crop` px, or as far as it goes, resized to `size` px.
 
     A depth that is no distance, such as infinity or zero, is a hole like any other.
     """
@@ -31,7 +31,7 @@ def square_view(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -
 
 
 def says_something(frame: DepthFrame, image: DepthFrame) -> bool:
-    """Whether a frame is large enough, and its square view `image` has enough returns and enough relief."""
+    """True if a frame is large enough, and its central square `image` has enough returns and relief."""
     known = np.isfinite(image.depth)
     if min(frame.depth.shape) < MIN_SIDE or known.mean() < MIN_SEEN:
         return False
@@ -39,7 +39,7 @@ def says_something(frame: DepthFrame, image: DepthFrame) -> bool:
 
 
 def empty_map(image: DepthFrame) -> GraspMap:
-    """A grasp map without any grasp, of the size of the image."""
+    """Return a grasp map without any grasp, of the size of the image."""
     return GraspMap(
         quality=np.zeros_like(image.depth),
         angle=np.zeros_like(image.depth),

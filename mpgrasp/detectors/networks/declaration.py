@@ -1,0 +1,50 @@
+"""Declaration of a network: all that the project has to know of it, written in the network's own file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from mpgrasp.depth import NETWORK_SIZE
+
+if TYPE_CHECKING:
+    from torch import nn
+
+HEADS = ("pos", "cos", "sin", "width")
+"""Outputs of every network in this order; `<head>_output` in checkpoints."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PublishedWeights:
+    """State dicts that the authors of a network have published, which can be read as they are."""
+
+    entry: str
+    """Name of a tensor that tells them from the state dicts of all other networks."""
+    width_px: float
+    """Opening that a width output of 1 stands for, in pixels of the network's own image [px]."""
+    card: Mapping[str, str]
+    """Training data, source and licence."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkDeclaration:
+    """One network: it maps an image (n, channels, H, W) to the four `HEADS`, each (n, 1, H, W)."""
+
+    network: Callable[[Any], nn.Module]
+    """Class of the network, which is made from its config."""
+    config: Callable[..., Any]
+    """Config dataclass; its fields are the settings in a weights file. It has `channels`, and `size` if the
+    network fits images of one size only."""
+    source: str
+    """Publication, in Markdown, for docs/networks.md."""
+    input_size: int = NETWORK_SIZE
+    """Side of the images that the network was designed for [px]."""
+    variants: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {"authors": {}})
+    """Settings by name of the sizes that docs/networks.md lists; without settings, for all modalities."""
+    published: PublishedWeights | None = None
+    """Published state dicts, if there are any that can be read."""
+
+    def build(self, settings: Mapping[str, Any]) -> nn.Module:
+        """Return the network with fresh weights; `settings` are keyword arguments of its config."""
+        return self.network(self.config(**settings))

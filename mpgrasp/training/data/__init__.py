@@ -1,0 +1,1 @@
+"""Training data: random scenes, their labels, and the shards that hold both."""

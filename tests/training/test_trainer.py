@@ -1,0 +1,120 @@
+"""Laws of the trainer: losses fall, runs resume to the bit, budgets end."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from toy_training import trainer
+
+from mpgrasp.detectors.network_detector import NetworkDetector
+from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.networks.weights import load_weights, read_card
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.training.metrics import match_labels
+from mpgrasp.training.progress import ProgressLog
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path: Path) -> None:
+    run = trainer(
+        shards, tmp_path / "w.safetensors", epochs=8.0, validate_every=1.0, average=0.95, augmentation=None
+    )
+    before = run.evaluate()["rectangle"]
+    first = run.train_step(run.batches.draw(0))[0]
+    best = run.run(ProgressLog(quiet=True))
+    last = run.train_step(run.batches.draw(0))[0]
+    assert last < 0.4 * first
+    assert best["rectangle"] > before + 0.3
+    card = read_card(tmp_path / "w.safetensors")["card"]
+    assert card["seed"] == 0
+    assert card["validation"]["hit"] == pytest.approx(best["hit"], abs=1e-3)
+    assert card["licence"]
+    detector = NetworkDetector.load("dhrnet", tmp_path / "w.safetensors")
+    hits = []
+    for i in run.dataset.held:
+        truth = run.dataset.sample(int(i))
+        hits.append(match_labels(*detector.grasp_arrays(truth.depth), truth).hit)
+    assert np.mean(hits) == pytest.approx(best["hit"], abs=0.2)  # float32 here, bfloat16 there
+
+
+def test_a_resumed_run_is_the_same_as_an_unbroken_one(shards: Path, tmp_path: Path) -> None:
+    whole = trainer(shards, tmp_path / "whole.safetensors")
+    whole.run(ProgressLog(quiet=True))
+    broken = trainer(shards, tmp_path / "broken.safetensors")
+    broken.run(ProgressLog(quiet=True), stop_after=3)
+    resumed = trainer(shards, tmp_path / "broken.safetensors")
+    assert resumed.resume()
+    assert resumed.step == 3
+    resumed.run(ProgressLog(quiet=True))
+    assert resumed.step == whole.step
+    state = resumed.network.state_dict()
+    for key, value in whole.network.state_dict().items():
+        assert torch.equal(value, state[key]), key
+        assert torch.equal(whole.average[key], resumed.average[key]), key
+    assert without_times(resumed.history) == without_times(whole.history)
+    assert (tmp_path / "broken.csv").is_file()
+
+
+def without_times(rows: list[dict[str, float]]) -> list[dict[str, float]]:
+    return [{k: v for k, v in row.items() if k != "minutes"} for row in rows]
+
+
+def test_a_run_that_is_told_to_stop_does_so_between_two_steps(shards: Path, tmp_path: Path) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors")
+
+    class Impatient(ProgressLog):
+        def update(self, progress: float, step: int, images: int, losses: Mapping[str, float]) -> None:
+            run.stop()
+
+    run.run(Impatient(quiet=True))
+    assert run.step == 1
+    again = trainer(shards, tmp_path / "w.safetensors")
+    assert again.resume()
+    assert again.step == 1
+
+
+def test_a_loss_that_is_not_finite_ends_the_run_with_one_error(shards: Path, tmp_path: Path) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors")
+    with torch.no_grad():
+        next(run.network.parameters()).fill_(float("nan"))
+    with pytest.raises(ConfigError, match="no longer finite"):
+        run.run(ProgressLog(quiet=True))
+
+
+def test_a_network_learns_from_colour_and_its_file_says_so(shards: Path, tmp_path: Path) -> None:
+    image = NetworkInput(size=64, modality="rgbd", centre="median", scale=20.0)
+    run = trainer(shards, tmp_path / "w.safetensors", input=image)
+    run.run(ProgressLog(quiet=True))
+    weights = load_weights("dhrnet", tmp_path / "w.safetensors")
+    assert weights.input == image
+    assert weights.settings["channels"] == 4
+    rows = list(csv.DictReader((tmp_path / "w.csv").open()))
+    assert [float(row["progress"]) for row in rows] == pytest.approx([0.5, 1.0], abs=0.1)
+    assert float(rows[-1]["validation_loss"]) > 0
+    assert float(rows[-1]["hit"]) == pytest.approx(run.history[-1]["hit"], abs=1e-4)
+    assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_budget_of_minutes_anneals_and_ends(shards: Path, tmp_path: Path) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors", minutes=0.03, validate_every=1.0)
+    run.run(ProgressLog(quiet=True))
+    assert run.progress == 1.0
+    assert run.elapsed < 10
+    assert run.optimiser.param_groups[0]["lr"] < 0.5 * run.config.lr
+    assert (tmp_path / "w.safetensors").is_file()
+
+
+def test_the_global_random_state_is_left_alone(shards: Path, tmp_path: Path) -> None:
+    torch.manual_seed(5)
+    before = torch.random.get_rng_state()
+    trainer(shards, tmp_path / "w.safetensors")
+    assert torch.equal(before, torch.random.get_rng_state())
