@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from mpgrasp.camera.wrist_camera import BACKENDS
+from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.motion.execution_config import ExecutionConfig
 
