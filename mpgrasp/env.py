@@ -22,7 +22,9 @@ from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.episode.episode import Episode, EpisodeConfig, controller_seed
+from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.episode import Episode
+from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.plugins import load_detector

@@ -15,8 +15,9 @@ import numpy as np
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode.config import ClearingConfig
-from mpgrasp.episode.episode import Episode, controller_seed, reach
+from mpgrasp.episode.episode import Episode, reach
 from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
+from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.motion.arm_driver import OnTick

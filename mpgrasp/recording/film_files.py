@@ -19,7 +19,7 @@ from mpgrasp.recording.watcher import Picture
 
 FILMS = (".gif", ".webp", ".mp4")
 """Suffixes of films that can be written."""
-MP4_RATE = 20
+MP4_RATE = 10
 """Pictures per second of an MP4 [Hz]; one that stands longer is repeated."""
 
 
