@@ -124,7 +124,7 @@ class Episode:
         self.detector.reset(self.scene.height_map(data=self.simulation.data) if truth else None)
 
     def look(self) -> Observation:
-        """Return the view of this tick. Its noise depends on seed and tick alone: a second look shows the same."""
+        """Return the view of this tick; its noise depends on seed and tick alone, not on earlier looks."""
         with self.timed("render"):
             self.frame = self.camera.capture(self.simulation.data, noise_rng(self.seed, self.ticks))
         with self.timed("detect"):

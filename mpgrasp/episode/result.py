@@ -87,7 +87,7 @@ class Pick:
     """Time at which the arm was back at its start [s]."""
 
     def as_record(self) -> dict[str, Any]:
-        """Return a JSON-ready dict with the keys of a single grasp's, but for timing and state, and the times."""
+        """Return a JSON-ready dict: the keys of a single grasp but for timing and state, and the times."""
         record = self.result.as_record()
         for key in ("timing", "state_hash"):
             del record[key]

@@ -10,11 +10,11 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replacing
-from mpgrasp.recording.false_colour import shade, shade_depth
+from mpgrasp.recording.false_colour import Picture, shade, shade_depth
 from mpgrasp.recording.film_files import FILMS, filmstrip, mp4_encoder, write_animation
 from mpgrasp.recording.film_picture import compose, write_caption
 from mpgrasp.recording.recorder import TickRecord, claim_file
-from mpgrasp.recording.watcher import VIEW, Picture, Watcher
+from mpgrasp.recording.watcher import VIEW, Watcher
 
 if TYPE_CHECKING:
     from mpgrasp.scene.simulation import Simulation

@@ -15,7 +15,7 @@ from PIL import Image
 
 from mpgrasp.exceptions import OutputError
 from mpgrasp.geometry import FloatArray
-from mpgrasp.recording.watcher import Picture
+from mpgrasp.recording.false_colour import Picture
 
 FILMS = (".gif", ".webp", ".mp4")
 """Suffixes of films that can be written."""

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from mpgrasp.recording.watcher import VIEW, Picture
+from mpgrasp.recording.false_colour import Picture
+from mpgrasp.recording.watcher import VIEW
 
 SIZE = (640, 360)
 """Width and height of a film's pictures [px]."""
