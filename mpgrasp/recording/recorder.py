@@ -37,7 +37,7 @@ class TickRecord:
     grasp: Grasp | None
     """The grasp in hand, once one is chosen."""
     event: str | None = None
-    """A reflex or an outcome, in words."""
+    """Reflex or outcome, in words."""
 
 
 class Recorder(Protocol):

@@ -25,7 +25,7 @@ from mpgrasp.recording.false_colour import HOLE
 INTRINSICS = CameraIntrinsics(fx=240.0, fy=240.0, cx=111.5, cy=111.5, width=224, height=224)
 POSE = looking_down([0.5, 0.0, 0.5])
 BLUE = (60, 140, 255)
-"""Of the best rectangle, as in the paper's Fig. 7."""
+"""Colour of the best rectangle, as in the paper's Fig. 7."""
 
 
 def frame(depth: FloatArray | None = None) -> DepthFrame:
