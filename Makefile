@@ -37,7 +37,7 @@ gl:
 demo: venv gl
 	rm -rf out/demo
 	$(BIN)/python -m mpgrasp.bench thin --controller mppc --episodes 5 --record 1 --out out/demo
-	@echo 'Watch it: $(BIN)/rerun out/demo/recordings/*.rrd, or open the GIF beside it.'
+	@echo 'Watch it: $(BIN)/rerun out/demo/recordings/*.rrd, or open the GIF or the MP4 beside it.'
 
 test: venv gl
 	$(BIN)/ruff check .

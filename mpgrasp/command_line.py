@@ -1,4 +1,4 @@
-"""What all command lines share: a parser that raises, errors as one line, and exit codes."""
+"""Parts that all command lines share: a parser that raises, errors as one line, and exit codes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def run_command(command: Callable[[], int]) -> int:
-    """Exit code of a command: its own, 2 and one line where its input cannot be used, 130 for Ctrl-C."""
+    """Run a command and return its exit code: its own, 2 and one line for unusable input, 130 for Ctrl-C."""
     try:
         return command()
     except MpgraspError as error:

@@ -22,7 +22,9 @@ from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.episode.episode import Episode, EpisodeConfig, controller_seed
+from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.episode import Episode
+from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.plugins import load_detector
@@ -30,8 +32,8 @@ from mpgrasp.recording.watcher import Watcher
 from mpgrasp.suite import Suite, episode_seed, load_suite
 
 ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
-"""What an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds, though
-it descends at half of the vertical one."""
+"""Motion that an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds,
+though it descends at half of the vertical one."""
 FIRST_TRAINING_EPISODE = 2**20
 """A reset without a seed plays an episode of this number or above, which no benchmark reaches."""
 
@@ -139,8 +141,8 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         info["reflex"] = str(result.reflex or "")
         return observed, float(result.success), True, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """Colour picture (312, 352, 3) of the scene as it is now, or None without a render mode."""
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture (312, 352, 3) of the scene as it is now, or None without a render mode."""
         if self.render_mode is None:
             return None
         if self._episode is None:
@@ -165,7 +167,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
 
 
 def _twist(action: ArrayLike) -> NDArray[np.float64]:
-    """Twist (6,) [m/s, rad/s] of an action (4,)."""
+    """Return the twist (6,) [m/s, rad/s] of an action (4,)."""
     action = np.asarray(action, float)
     if action.shape != (len(ACTION_SCALE),) or not np.isfinite(action).all():
         raise ConfigError("unusable action", got=action.tolist(), allowed="4 finite numbers in [-1, 1]")
@@ -187,7 +189,7 @@ def _observed(frame: DepthFrame, view: Observation) -> Observed:
 
 
 def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
-    """Quality on the pixels of `image`, whatever the crop and size of the detector's own; 0 beyond them."""
+    """Return the quality on the pixels of `image`, whatever those of the detector; 0 beyond them."""
     to, own, quality = image.intrinsics, view.intrinsics, np.nan_to_num(view.quality)
     if own != to:
         v, u = np.indices((to.height, to.width)).astype(float)

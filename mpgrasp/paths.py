@@ -1,12 +1,11 @@
-"""Where assets, scenes, benchmarks and weights lie, in the checkout or in the wheel, and where the cache is.
-
-The cache folder follows https://specifications.freedesktop.org/basedir-spec/latest/.
-"""
+"""Folders of assets, scenes, benchmarks and weights, in the checkout or in the wheel, and of the cache."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+import platformdirs
 
 _PACKAGE = Path(__file__).resolve().parent
 _CHECKOUT = _PACKAGE.parent
@@ -22,16 +21,14 @@ BENCHMARKS = DATA_ROOT / "benchmarks"
 
 
 def cache_folder() -> Path | None:
-    """Folder for what can be made again; it need not exist, nor be writable. None without a home.
+    """Return the folder for what can be made again; it need not exist, nor be writable. None without a home.
 
-    $MPGRASP_CACHE, else mpgrasp/ in $XDG_CACHE_HOME, else ~/.cache/mpgrasp.
+    $MPGRASP_CACHE, else mpgrasp/ among the user's caches: in $XDG_CACHE_HOME, else in ~/.cache on Linux.
     """
     if own := os.environ.get("MPGRASP_CACHE"):
         return Path(own).expanduser().absolute()
-    shared = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    if shared.is_absolute():
-        return shared / "mpgrasp"
     try:
-        return Path.home() / ".cache" / "mpgrasp"
-    except RuntimeError:
+        folder = platformdirs.user_cache_path("mpgrasp", appauthor=False)
+    except RuntimeError:  # no home
         return None
+    return folder if folder.is_absolute() else None

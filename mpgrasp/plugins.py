@@ -20,14 +20,14 @@ _CONTROLLER_METHODS = ("reset", "update", "final_grasp", "diagnostics")
 
 
 def detector_names() -> tuple[str, ...]:
-    """Names in the registry of detectors."""
+    """Return the names in the registry of detectors."""
     from mpgrasp.detectors import DETECTORS
 
     return tuple(DETECTORS)
 
 
 def controller_names() -> tuple[str, ...]:
-    """Names in the registry of controllers."""
+    """Return the names in the registry of controllers."""
     from mpgrasp.controllers import CONTROLLERS
 
     return tuple(CONTROLLERS)
@@ -40,7 +40,7 @@ def check_name(kind: str, name: str, known: Iterable[str]) -> None:
 
 
 def load_detector(name: str, weights: Path | None = None, runtime: str = "auto") -> GraspDetector:
-    """A detector, ready to use.
+    """Return a detector, ready to use.
 
     Args:
         name: in the registry, or an import path.
@@ -59,7 +59,7 @@ def load_detector(name: str, weights: Path | None = None, runtime: str = "auto")
         from mpgrasp.detectors import make_detector
 
         try:
-            detector: GraspDetector = make_detector(name, weights=weights, runtime=runtime)
+            return make_detector(name, weights=weights, runtime=runtime)
         except MpgraspError:
             raise
         except Exception as error:  # a damaged file makes its reader fail in any way
@@ -68,13 +68,13 @@ def load_detector(name: str, weights: Path | None = None, runtime: str = "auto")
                 got="the shipped ones" if weights is None else str(weights),
                 allowed=f"a weights file of {name}",
             ) from error
-        return detector
     arguments = {} if weights is None else {"weights": weights}
-    return _make("detector", name, arguments, _DETECTOR_METHODS)
+    plug_in: GraspDetector = _make("detector", name, arguments, _DETECTOR_METHODS)
+    return plug_in
 
 
 def load_controller(name: str) -> Controller:
-    """A controller, ready to use.
+    """Return a controller, ready to use.
 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
@@ -83,9 +83,9 @@ def load_controller(name: str) -> Controller:
     if ":" not in name:
         from mpgrasp.controllers import make_controller
 
-        controller: Controller = make_controller(name)
-        return controller
-    return _make("controller", name, {}, _CONTROLLER_METHODS)
+        return make_controller(name)
+    plug_in: Controller = _make("controller", name, {}, _CONTROLLER_METHODS)
+    return plug_in
 
 
 def _check_readable(weights: Path) -> None:
@@ -101,7 +101,7 @@ def _check_readable(weights: Path) -> None:
 
 
 def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str]) -> Any:
-    """An instance of the class at `module:Class`; whatever goes wrong in there becomes a ConfigError."""
+    """Return an instance of the class at `module:Class`; what goes wrong in there becomes a ConfigError."""
     module_name, _, class_name = path.partition(":")
     try:
         module = importlib.import_module(module_name)
@@ -135,7 +135,7 @@ def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str
 
 
 def parse_weights(given: Sequence[str], detectors: Sequence[str]) -> dict[str, Path]:
-    """Weights files by detector from `FILE` or `DETECTOR=FILE`.
+    """Return weights files by detector from `FILE` or `DETECTOR=FILE`.
 
     Raises:
         ConfigError: it is unclear or impossible whose weights they are.

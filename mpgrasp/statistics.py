@@ -22,11 +22,11 @@ CONFIDENCE = 0.95
 SIGNIFICANCE = 0.05
 """A corrected p below this is called significant."""
 RESAMPLES = 9999
-"""Of the bootstrap; its generator always starts from the same seed."""
+"""Number of resamples of the bootstrap; its generator always starts from the same seed."""
 
 
 def wilson_interval(successes: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Wilson's score interval (low, high) of a success rate; (0, 1) where nothing was tried.
+    """Return Wilson's score interval (low, high) of a success rate; (0, 1) where nothing was tried.
 
     Raises:
         ConfigError: more successes than trials, or negative counts.
@@ -42,7 +42,7 @@ def wilson_interval(successes: int, n: int, confidence: float = CONFIDENCE) -> t
 
 
 def mcnemar(a_alone: int, b_alone: int) -> float:
-    """Two-sided p of McNemar's exact test: pairs in which A alone and in which B alone succeeded."""
+    """Return the two-sided p of McNemar's exact test on pairs in which A alone and B alone succeeded."""
     from scipy.stats import binomtest
 
     if min(a_alone, b_alone) < 0:
@@ -52,7 +52,7 @@ def mcnemar(a_alone: int, b_alone: int) -> float:
 
 
 def wilcoxon(gain: Sequence[float] | FloatArray) -> tuple[float, bool]:
-    """Two-sided p of Wilcoxon's signed-rank test on differences, and whether they are rather positive."""
+    """Return the two-sided p of Wilcoxon's signed-rank test on differences; True if they lean above 0."""
     from scipy.stats import wilcoxon as signed_rank
 
     values = np.asarray(gain, float)
@@ -63,8 +63,8 @@ def wilcoxon(gain: Sequence[float] | FloatArray) -> tuple[float, bool]:
 
 
 def smallest_p(n: int) -> float:
-    """The smallest two-sided p that either exact paired test can give with n pairs: all n differ one way."""
-    return min(1.0, 2 / 2**n)
+    """Return the smallest two-sided p of either exact paired test with n pairs: all n differ one way."""
+    return min(1.0, 2.0 ** (1 - n))
 
 
 FEWEST_PAIRS = next(n for n in count() if smallest_p(n) < SIGNIFICANCE)
@@ -72,7 +72,7 @@ FEWEST_PAIRS = next(n for n in count() if smallest_p(n) < SIGNIFICANCE)
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Holm's corrected p of a family of tests, in the order given.
+    """Return Holm's corrected p of a family of tests, in the order given.
 
     scipy has the false discovery rate only, and statsmodels would bring pandas for these three lines.
     """
@@ -87,15 +87,16 @@ def holm(p: Sequence[float]) -> list[float]:
 def mean_interval(
     values: Sequence[float] | FloatArray, confidence: float = CONFIDENCE
 ) -> tuple[float, float, float]:
-    """Mean with its bootstrap interval: (mean, low, high); the bounds are NaN for fewer than two values."""
+    """Return the mean with its bootstrap interval: (mean, low, high); bounds are NaN below two values."""
     return _bootstrap(values, np.mean, "BCa", confidence)
 
 
 def median_interval(
     values: Sequence[float] | FloatArray, confidence: float = CONFIDENCE
 ) -> tuple[float, float, float]:
-    """Median with its bootstrap interval, as `mean_interval`; by percentiles, since a median has too few
-    different values for the correction's jackknife.
+    """Return the median with its bootstrap interval, as `mean_interval`.
+
+    The interval is by percentiles: a median has too few different values for the correction's jackknife.
     """
     return _bootstrap(values, np.median, "percentile", confidence)
 
@@ -128,6 +129,6 @@ def _bootstrap(
 
 
 def restricted(times: Sequence[float] | FloatArray, limit: float | None) -> FloatArray:
-    """Times cut off at the limit, if there is one: their mean is the restricted mean time."""
+    """Return times cut off at the limit, if there is one: their mean is the restricted mean time."""
     values = np.asarray(times, float)
     return values if limit is None else np.minimum(values, limit)

@@ -9,32 +9,33 @@ played unless a number is given), and optionally an `[episode]` table with field
 
 from __future__ import annotations
 
-import dataclasses
 import tomllib
 import zlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.files.settings import from_table, refuse_unknown
 from mpgrasp.paths import BENCHMARKS
 
 if TYPE_CHECKING:
-    from mpgrasp.episode.config import EpisodeConfig
     from mpgrasp.scene.config import SceneConfig
+    from mpgrasp.scene.objects.model import ObjectModel
 
-_KEYS = ("title", "trial", "trials", "scene", "turns", "episode")
-TRIALS = ("grasp", "clear")
-"""What an episode can be: one grasp, or a table to be cleared."""
+Trial = Literal["grasp", "clear"]
+"""Kind of an episode: one grasp, or a table to be cleared."""
+TRIALS: tuple[Trial, ...] = get_args(Trial)
 BOX_DENSITY = 1000.0
-"""Of a box that is declared by its size [kg/m3]."""
-_ACCEPTED: Mapping[str, tuple[type, ...]] = {
-    "bool": (bool,), "int": (int,), "float": (int, float), "str": (str,)
-}  # fmt: skip
-"""Types of value that a setting takes, by its annotation; configs check the others themselves."""
+"""Density of a box that is declared by its size [kg/m3]."""
+
+_EPISODE_CONFIGS: Mapping[Trial, type[EpisodeConfig]] = {"grasp": EpisodeConfig, "clear": ClearingConfig}
+_CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
+"""Settings of an episode that no suite decides, and what decides them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +46,7 @@ class Suite:
     title: str
     scenes: tuple[SceneConfig, ...]
     """One per turn; episode k takes scene k modulo their number."""
-    trial: str = "grasp"
+    trial: Trial = "grasp"
     """One of `TRIALS`."""
     trials: int = 10
     """Episodes of each combination that are played unless a number is given."""
@@ -58,10 +59,19 @@ class Suite:
             raise ConfigError(f"{where} has no scene", allowed="one scene or more")
         if self.trial not in TRIALS:
             raise ConfigError(f"{where}: unknown trial", got=self.trial, allowed=TRIALS)
-        if type(self.trials) is not int or self.trials < 1:  # true is an int to isinstance
+        if self.trials < 1:
             raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed="1 or more")
         if self.trial == "clear" and not all(scene.basket for scene in self.scenes):
             raise ConfigError(f"{where}: clearing needs a basket", got="basket = false", allowed="true")
+        self._check_episode(f"{where}, [episode]")
+
+    def _check_episode(self, where: str) -> None:
+        for key, whose in _CALLERS.items():
+            if key in self.episode:
+                raise ConfigError(f"{where}: no suite decides {key}", got=self.episode[key], allowed=whose)
+        names = (f.name for f in fields(_EPISODE_CONFIGS[self.trial]))
+        refuse_unknown(self.episode, (name for name in names if name not in _CALLERS), where)
+        self.episode_config()
 
     @property
     def scene(self) -> SceneConfig:
@@ -69,30 +79,26 @@ class Suite:
         return self.scene_config(0)
 
     def scene_config(self, episode: int) -> SceneConfig:
-        """What is on the table in an episode, counted from 0."""
+        """Return what is on the table in an episode, counted from 0."""
         return self.scenes[episode % len(self.scenes)]
 
     def episode_config(self, *, camera: str = "auto", noise: bool = True) -> EpisodeConfig:
-        """How an episode runs: the suite's settings with the caller's camera backend and noise switch.
+        """Return how an episode runs: the suite's settings with the caller's camera backend and noise switch.
 
         Raises:
-            ConfigError: a setting that the trial's config does not have, or refuses.
+            ConfigError: an unknown camera backend.
         """
-        from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
-
-        kind = ClearingConfig if self.trial == "clear" else EpisodeConfig
         settings = {**self.episode, "camera_backend": camera, "noise": noise}
-        config: EpisodeConfig = _construct(kind, settings, f"suite {self.name!r}, [episode]")
-        return config
+        return from_table(_EPISODE_CONFIGS[self.trial], settings, f"suite {self.name!r}, [episode]")
 
 
 def suite_names() -> tuple[str, ...]:
-    """Names of the suites that ship with mpgrasp, in alphabetical order."""
+    """Return the names of the suites that ship with mpgrasp, in alphabetical order."""
     return tuple(sorted(path.stem for path in BENCHMARKS.glob("*.toml")))
 
 
 def load_suite(name: str) -> Suite:
-    """The suite of a name in benchmarks/, or of a path to a declaration that ends in `.toml`.
+    """Return the suite of a name in benchmarks/, or of a path to a declaration that ends in `.toml`.
 
     Raises:
         ConfigError: no such suite, or a declaration that cannot be used.
@@ -115,7 +121,7 @@ def load_suite(name: str) -> Suite:
 
 
 def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
-    """The suite that a declaration, already read from TOML, describes.
+    """Return the suite that a declaration, already read from TOML, describes.
 
     Raises:
         ConfigError: a key that is unknown, or a value that cannot be used.
@@ -123,97 +129,77 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
     from mpgrasp.scene.config import SceneConfig
 
     where = f"suite {name!r}"
-    _refuse_unknown(declared, _KEYS, where)
-    title = declared.get("title")
-    if not isinstance(title, str) or not title:
-        raise ConfigError(f"{where} has no title", got=title, allowed='title = "..."')
-    shared, turns = declared.get("scene", {}), declared.get("turns", [{}])
-    episode = declared.get("episode", {})
-    for key, table in (("scene", shared), ("episode", episode)):
-        if not isinstance(table, dict):
-            raise ConfigError(f"{where}, {key} is not a table", got=table, allowed=f"[{key}]")
-    if not isinstance(turns, list) or not all(isinstance(turn, dict) for turn in turns):
-        raise ConfigError(f"{where}, turns is not a list of tables", got=turns, allowed="[[turns]]")
+    found = from_table(_Declaration, declared, where)
+    if not found.title:
+        raise ConfigError(f"{where} has no title", got=found.title, allowed='title = "..."')
     scenes = tuple(
-        _construct(SceneConfig, _with_objects({**shared, **turn}, where), f"{where}, [scene]")
-        for turn in turns
+        from_table(
+            SceneConfig, _with_objects({**found.scene, **turn}, f"{where}, [scene]"), f"{where}, [scene]"
+        )
+        for turn in found.turns
     )
-    settings = {key: declared[key] for key in ("trial", "trials") if key in declared}
-    return Suite(name=name, title=title, scenes=scenes, episode=_as_tuples(episode), **settings)
+    return Suite(
+        name=name,
+        title=found.title,
+        scenes=scenes,
+        trial=found.trial,
+        trials=found.trials,
+        episode=found.episode,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Declaration:
+    """A suite's TOML file, before its tables are read."""
+
+    title: str
+    trial: Trial = "grasp"
+    trials: int = 10
+    scene: dict[str, Any] = field(default_factory=dict)
+    turns: tuple[dict[str, Any], ...] = ({},)
+    episode: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Box:
+    """A box among a scene's objects, such as a stick of a certain thickness."""
+
+    box: tuple[float, float, float]
+    """Its edges [m]."""
+    name: str = "box"
+    density: float = BOX_DENSITY
+    """[kg/m3]"""
+
+    def as_object(self) -> ObjectModel:
+        """Return the box as an object that a scene can hold."""
+        from mpgrasp.scene.objects.model import ObjectModel, Part
+
+        x, y, z = self.box
+        part = Part(shape="box", size=(x / 2, y / 2, z / 2))
+        mass = self.density * part.volume
+        return ObjectModel(name=self.name, parts=(part,), mass=mass, provenance="its suite")
+
+
+def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return the table of a scene with `{ box = [x, y, z] }` among its objects made into boxes."""
+    objects = scene.get("objects")
+    if not isinstance(objects, list):
+        return dict(scene)
+    made = [
+        from_table(_Box, o, f"{where}, objects").as_object() if isinstance(o, dict) else o for o in objects
+    ]
+    return {**scene, "objects": made}
 
 
 def episode_seed(suite: str, seed: int, episode: int) -> int:
-    """Seed of one episode: 32 bits that depend on the suite's name, the run's seed and the episode alone.
+    """Return the seed of one episode.
 
-    Scene, sensor noise and start pose follow from it, so that every detector and every controller
-    meets the same worlds, and two suites never share one. It is the first word of numpy's
-    SeedSequence over (crc32 of the suite's name, seed, episode).
+    It depends on the suite's name, the run's seed and the episode alone. Scene, sensor noise and start pose
+    follow from it, so that every detector and every controller meets the same worlds, and two suites never
+    share one. It is 32 bits, the first word of numpy's SeedSequence over (crc32 of the suite's name, seed,
+    episode).
     """
     if seed < 0 or episode < 0:
         raise ConfigError("negative seed or episode", got=(seed, episode), allowed="0, 1, 2, ...")
     entropy = [zlib.crc32(suite.encode()), seed, episode]
     return int(np.random.SeedSequence(entropy).generate_state(1)[0])
-
-
-def _construct(kind: Any, settings: Mapping[str, Any], where: str) -> Any:
-    """An instance of a config dataclass from declared settings, with errors that name the place."""
-    fields = {f.name: f for f in dataclasses.fields(kind)}
-    _refuse_unknown(settings, fields, where)
-    values = {key: _value(fields[key], value, f"{where}, {key}") for key, value in settings.items()}
-    try:
-        return kind(**values)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"{where}: {error}") from error
-
-
-def _value(declared: dataclasses.Field[Any], value: Any, where: str) -> Any:
-    """What a setting is declared to be; of a config within the config, only what departs from its default."""
-    make = declared.default_factory
-    default: Any = declared.default if make is dataclasses.MISSING else make()
-    nested = dataclasses.is_dataclass(default) and not isinstance(default, type)
-    if isinstance(value, Mapping) is not nested:
-        allowed = [f.name for f in dataclasses.fields(default)] if nested else f"a value such as {default!r}"
-        raise ConfigError(f"{where} is {'not ' if nested else ''}a table", got=value, allowed=allowed)
-    accepted = _ACCEPTED.get(str(declared.type).removesuffix(" | None"))
-    if accepted and value is not None and type(value) not in accepted:  # true is an int to isinstance
-        raise ConfigError(f"{where} is unusable", got=value, allowed=f"a value such as {default!r}")
-    if not nested:
-        return _as_tuples(value)
-    rest = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}
-    return _construct(type(default), {**rest, **value}, where)
-
-
-def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """The table of a scene with `{ box = [x, y, z] }` among its objects made into boxes."""
-    objects = scene.get("objects")
-    if not isinstance(objects, list):
-        return dict(scene)
-    return {**scene, "objects": [_box(o, where) if isinstance(o, dict) else o for o in objects]}
-
-
-def _box(declared: Mapping[str, Any], where: str) -> Any:
-    """A box of some size, such as a stick of a certain thickness."""
-    from mpgrasp.scene.objects.model import ObjectModel, Part
-
-    _refuse_unknown(declared, ("box", "name", "density"), f"{where}, objects")
-    edges, density = declared.get("box"), declared.get("density", BOX_DENSITY)
-    try:
-        part = Part(shape="box", size=tuple(edge / 2 for edge in edges or ()))
-        name = declared.get("name", "box")
-        return ObjectModel(name=name, parts=(part,), mass=density * part.volume, provenance="its suite")
-    except TypeError as error:
-        raise ConfigError(f"{where}: unusable box", got=dict(declared), allowed="edges [m]") from error
-
-
-def _refuse_unknown(table: Mapping[str, Any], allowed: Iterable[str], where: str) -> None:
-    allowed = list(allowed)
-    for key in table:
-        if key not in allowed:
-            raise ConfigError(f"{where}: unknown key", got=key, allowed=allowed)
-
-
-def _as_tuples(value: Any) -> Any:
-    """TOML arrays as tuples, which frozen configs can hold."""
-    if isinstance(value, dict):
-        return {key: _as_tuples(item) for key, item in value.items()}
-    return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value

@@ -8,9 +8,8 @@ import pytest
 
 from mpgrasp.bench import __main__ as bench
 from mpgrasp.command_line import Parser, run_command
-from mpgrasp.detectors.__main__ import make_parser
+from mpgrasp.detectors import __main__ as detectors
 from mpgrasp.exceptions import ConfigError, OutputError
-from mpgrasp.inspection import show
 from mpgrasp.scene import __main__ as scene_command
 from mpgrasp.training import __main__ as training
 
@@ -22,7 +21,7 @@ from mpgrasp.training import __main__ as training
         (bench.main, ["compare", "a", "b"]),
         (training.main, ["generate", "--out", "a"]),
         (training.main, ["train", "dhrnet", "--data", "a"]),
-        (lambda words: show.main(make_parser(), words), ["show", "dhrnet"]),
+        (detectors.main, ["show", "dhrnet"]),
         (scene_command.main, ["thin"]),
     ],
 )

@@ -15,10 +15,12 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 
-from mpgrasp.camera.wrist_camera import BACKENDS, D435_INTRINSICS
+from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.wrist_camera import D435_INTRINSICS
 from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors import RUNTIMES, make_detector
+from mpgrasp.detectors import make_detector
 from mpgrasp.detectors.networks.registry import NETWORKS
+from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.episode.episode import run_episode
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down

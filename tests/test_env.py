@@ -16,7 +16,8 @@ from mpgrasp.controllers import make_controller
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
 from mpgrasp.detectors import make_detector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
-from mpgrasp.episode.episode import EpisodeConfig, run_episode
+from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.episode import run_episode
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap

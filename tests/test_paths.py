@@ -67,3 +67,10 @@ def test_the_cache_is_where_the_environment_says(tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("MPGRASP_CACHE", "~/own")
     assert paths.cache_folder() == tmp_path / "home" / "own"
     assert not list(tmp_path.iterdir())
+
+
+def test_there_is_no_cache_without_a_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("MPGRASP_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)  # as where nobody knows who this is
+    assert paths.cache_folder() is None

@@ -125,7 +125,7 @@ def exact_p(a: int, b: int) -> float:
     """Sum of the probabilities of all outcomes that are no more likely than this one."""
     n = a + b
     weights = [math.comb(n, k) for k in range(n + 1)]
-    return sum(w for w in weights if w <= weights[a]) / 2**n
+    return float(sum(w for w in weights if w <= weights[a]) / 2**n)
 
 
 @pytest.mark.parametrize(("a", "b"), [(0, 0), (1, 0), (5, 0), (2, 9), (9, 2), (4, 4), (10, 25)])

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,24 +60,41 @@ def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("declared", "message"),
     [
-        ({"scene": {}}, "no title"),
+        ({"scene": {}}, "title is missing; allowed: a text"),
+        (MINIMAL | {"title": ""}, "no title"),
+        (MINIMAL | {"title": 1}, "title is unusable; got 1; allowed: a text"),
         (MINIMAL | {"objects": ["key"]}, "unknown key.*'objects'.*trial, trials, scene, turns, episode"),
         (MINIMAL | {"scene": {"cloth": 1}}, "unknown key.*'cloth'.*cloth_unevenness"),
         (MINIMAL | {"turns": [{"cloth": 1}]}, "unknown key.*'cloth'"),
         (MINIMAL | {"turns": []}, "no scene"),
-        (MINIMAL | {"turns": {"objects": ["key"]}}, "not a list of tables"),
-        (MINIMAL | {"scene": ["key"]}, "not a table"),
+        (MINIMAL | {"turns": {"objects": ["key"]}}, "turns is unusable; got .*; allowed: a list of tables"),
+        (MINIMAL | {"scene": ["key"]}, "scene is unusable; got .*; allowed: a table"),
         (MINIMAL | {"scene": {"cloth_unevenness": -1.0}}, "unevenness"),
         (
             MINIMAL | {"scene": {"cloth_unevenness": "deep"}},
             "suite 's', .scene., cloth_unevenness is unusable",
         ),
         (MINIMAL | {"scene": {"camouflage": "no"}}, "camouflage is unusable; got 'no'; allowed: .*False"),
-        (MINIMAL | {"trials": True}, "trials out of range; got True"),
-        (MINIMAL | {"trials": 2.5}, "trials out of range; got 2.5"),
+        (MINIMAL | {"trials": True}, "trials is unusable; got True; allowed: a value such as 10"),
+        (MINIMAL | {"trials": 2.5}, "trials is unusable; got 2.5"),
+        (MINIMAL | {"trials": 0}, "trials out of range; got 0"),
+        (MINIMAL | {"trial": "throw"}, "trial is unusable; got 'throw'; allowed: grasp, clear"),
+        (
+            MINIMAL | {"scene": {"placing": "heap"}},
+            "placing is unusable; got 'heap'; allowed: scatter, pile, stack",
+        ),
+        (
+            MINIMAL | {"scene": {"objects": [{"box": [0.1, 0.1]}]}},
+            "objects, box is unusable; got .0.1, 0.1.; allowed: a list of 3, each a number",
+        ),
+        (MINIMAL | {"scene": {"objects": [{"name": "b"}]}}, "objects, box is missing"),
+        (
+            MINIMAL | {"scene": {"objects": [{"edges": []}]}},
+            "objects: unknown key; got 'edges'; allowed: box, name, density",
+        ),
     ],
 )
-def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
+def test_faulty_declarations_are_refused(declared: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         parse_suite("s", declared)
 
@@ -91,16 +110,26 @@ def test_faulty_declarations_are_refused(declared: dict, message: str) -> None:
         ({"execution": 0.1}, "execution is not a table; got 0.1; allowed: .*overtravel"),
         ({"execution": {"lift": "high"}}, "execution, lift is unusable; got 'high'"),
         ({"execution": {"lift": -0.1}}, "execution: lift must be finite and not negative"),
-        ({"start_jitter": {"x": 0.1}}, "start_jitter is a table; got .*; allowed: a value such as 0.05"),
+        ({"start_jitter": {"x": 0.1}}, "start_jitter is unusable; got .*; allowed: a value such as 0.05"),
+        (
+            {"max_reach_time": math.inf},
+            "max_reach_time is not finite; got inf; allowed: a value such as 20.0",
+        ),
+        ({"start_jitter": math.nan}, "start_jitter is not finite; got nan"),
+        (
+            {"camera_backend": "ray"},
+            "no suite decides camera_backend; got 'ray'; allowed: the option --camera",
+        ),
+        ({"noise": False}, "no suite decides noise; got False; allowed: the option --no-noise"),
         ({"start_height": True}, "start_height is unusable; got True"),
         ({"camera_crop": "all"}, "camera_crop is unusable; got 'all'"),
     ],
 )
 def test_episode_settings_that_cannot_be_used_are_refused_before_any_episode(
-    declared: dict, message: str
+    declared: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ConfigError, match=message) as refused:
-        parse_suite("s", MINIMAL | {"episode": declared}).episode_config()
+        parse_suite("s", MINIMAL | {"episode": declared})
     assert str(refused.value).count("suite 's'") == 1
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode.config import ClearingConfig
-from mpgrasp.episode.episode import Episode, controller_seed, reach
+from mpgrasp.episode.episode import Episode, reach
 from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
+from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.motion.arm_driver import OnTick
@@ -31,7 +32,7 @@ from mpgrasp.workspace import WORKSPACE_CENTRE, WORKSPACE_REACH
 FALLEN = -0.02
 """An object whose frame lies lower than this over the table has fallen off it [m]."""
 DROPS = ((-0.03, -0.05), (0.03, 0.05), (-0.03, 0.05), (0.03, -0.05), (0.0, 0.0))
-"""Where in the basket the hand opens, in turn: x, y from its centre [m]. A single heap would overflow."""
+"""Places in the basket at which the hand opens, in turn: x, y from its centre [m]. A heap would overflow."""
 CONTACT = 12.0
 """Force at which the hand opens above the basket because it is on something [N]: more than things weigh."""
 GUIDED_RATE = 0.5
@@ -81,7 +82,7 @@ def require_basket(scene_config: SceneConfig) -> None:
 
 
 class Basket:
-    """Where a scene's drop basket stands, and what lies in it."""
+    """The drop basket of a scene: its place, and what lies in it."""
 
     def __init__(self, scene: Scene) -> None:
         floor = scene.model.geom("basket/floor")
@@ -90,7 +91,7 @@ class Basket:
         self._half: FloatArray = np.array(floor.size[:2])
 
     def holds(self, position: FloatArray) -> bool:
-        """Whether a world position (3,) [m] is in the basket or heaped upon what is."""
+        """Return True if a world position (3,) [m] is in the basket or heaped upon what is."""
         return bool(np.all(np.abs(position[:2] - self.centre) <= self._half) and position[2] > 0)
 
 
@@ -120,7 +121,7 @@ class Clearing:
         return self.episode.simulation.time - self._start_time
 
     def play(self) -> ClearingResult:
-        """Attempt after attempt, to the end."""
+        """Play attempt after attempt, to the end."""
         while (outcome := self._ending()) is None:
             if self.picks:
                 self.episode.begin()
@@ -152,7 +153,7 @@ class Clearing:
         return Outcome.NO_GRASP if self._blind >= self.config.blind_attempts else None
 
     def _whereabouts(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-        """Names of the objects in the basket, lost, and still to be picked."""
+        """Return the names of the objects in the basket, lost, and still to be picked."""
         places: tuple[list[str], list[str], list[str]] = ([], [], [])
         for name in self.episode.scene.objects:
             position = self.episode.simulation.object_pose(name)[:3, 3]
@@ -245,7 +246,7 @@ class Clearing:
         self.episode.driver.move_to(target, self.config.carry_speed, on_tick=self._showing(phase))
 
     def _learn(self, result: EpisodeResult) -> None:
-        """What the next attempt is to know."""
+        """Keep what the next attempt is to know."""
         if result.outcome is Outcome.NO_GRASP:
             self._blind += 1
         else:

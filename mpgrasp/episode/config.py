@@ -1,17 +1,17 @@
-"""How an episode runs, whatever the detector and the controller: one grasp, or a table to be cleared."""
+"""Settings of an episode, whatever the detector and the controller: one grasp, or a table to be cleared."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from mpgrasp.camera.wrist_camera import BACKENDS
+from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.motion.execution_config import ExecutionConfig
 
 
 @dataclass(frozen=True, kw_only=True)
 class EpisodeConfig:
-    """How a single grasp runs."""
+    """Settings of a single grasp."""
 
     control_dt: float = 0.1
     """Period of the control tick: image, detection, decision [s]."""
@@ -27,15 +27,15 @@ class EpisodeConfig:
     camera_crop: int | None = 350
     """Central square of the 640 x 480 image that is rendered [px]; None for the whole image."""
     noise: bool = True
-    """Whether the depth camera is as noisy as a D435."""
+    """True for a depth camera as noisy as a D435."""
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
-    """How the chosen grasp is executed and judged."""
+    """Execution of the chosen grasp, and how it is judged."""
 
     def __post_init__(self) -> None:
         for name in ("control_dt", "start_height", "max_reach_time"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive", got=getattr(self, name))
-        if self.start_jitter < 0:
+        if not self.start_jitter >= 0:
             raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
         if self.camera_backend not in BACKENDS:
             raise ConfigError("unknown camera backend", got=self.camera_backend, allowed=BACKENDS)
@@ -43,7 +43,7 @@ class EpisodeConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class ClearingConfig(EpisodeConfig):
-    """How a table is cleared: pick, carry to the basket, drop, return, over and over."""
+    """Settings of a table to be cleared: pick, carry to the basket, drop, return, over and over."""
 
     time_limit: float = 900.0
     """No attempt begins later than this, and a table that is clear only then counts as a timeout
@@ -51,7 +51,7 @@ class ClearingConfig(EpisodeConfig):
     blind_attempts: int = 3
     """So many attempts in a row in which nothing to grasp was found end the episode."""
     recovery_time: float = 5.0
-    """What a protective stop costs until the arm moves again: the stop is noticed, acknowledged and
+    """Time that a protective stop costs until the arm moves again: the stop is noticed, acknowledged and
     recovered from [s]. Not a figure of the robot, but the same for all."""
     carry_height: float = 0.30
     """Height of the tool point over the table on its way to the basket [m]."""
@@ -59,15 +59,15 @@ class ClearingConfig(EpisodeConfig):
     """Height of the tool point over the table at which the hand opens above the basket, unless what it
     holds comes to stand on something before [m]."""
     carry_speed: float = 0.25
-    """[m/s]"""
+    """Speed with an object in the hand [m/s]."""
     lower_speed: float = 0.1
-    """Of the last part of the way, into the basket [m/s]."""
+    """Speed on the last part of the way, into the basket [m/s]."""
     drop_time: float = 0.4
-    """For which the open hand waits above the basket [s]."""
+    """Time for which the open hand waits above the basket [s]."""
     execution: ExecutionConfig = field(
         default_factory=lambda: ExecutionConfig(hold_time=0.0, shake_time=0.0, settle_after_shake=0.0)
     )
-    """How each grasp is executed: carrying takes the place of hold and shake."""
+    """Execution of each grasp: carrying takes the place of hold and shake."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

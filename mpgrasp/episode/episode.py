@@ -6,41 +6,29 @@ every controller meets the same world: the noise of a tick is drawn anew from (s
 
 from __future__ import annotations
 
-import time
-from collections import defaultdict
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 
 import numpy as np
 
-from mpgrasp.camera.noise import DepthNoise
-from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.metrics import ReachMetrics
 from mpgrasp.episode.result import EpisodeResult
-from mpgrasp.geometry import FloatArray, invert, looking_down
+from mpgrasp.episode.seeds import controller_seed, noise_rng
+from mpgrasp.episode.stages import StageClock
+from mpgrasp.episode.world import World
+from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution import execute_grasp
-from mpgrasp.motion.ik import solve_pose
 from mpgrasp.motion.motion_statistics import MotionStatistics
 from mpgrasp.outcome import Outcome
 from mpgrasp.recording.recorder import NullRecorder, Recorder, TickRecord
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.scene import build_scene
-from mpgrasp.scene.simulation import Simulation
-from mpgrasp.workspace import WORKSPACE_CENTRE
 
-STAGES = ("render", "detect", "control", "ik", "physics")
-"""What a control tick of the reach spends its time on."""
-
-# streams of an episode's seed beside those of the scene
-_NOISE_STREAM = 11
-_START_STREAM = 12
-_CONTROLLER_STREAM = 13
 _TICK_PERIOD = 0.1  # [s], between two records of a recording once the reach is over
 
 
@@ -77,7 +65,7 @@ def run_episode(
 
 
 def reach(episode: Episode, controller: Controller) -> Grasp | None:
-    """Look and move under a controller until it is done: its grasp; None without one or if interrupted."""
+    """Look and move under a controller until it is done, and return its grasp; None if it was interrupted."""
     while episode.interruption() is None:
         observation = episode.look()
         with episode.timed("control"):
@@ -86,12 +74,6 @@ def reach(episode: Episode, controller: Controller) -> Grasp | None:
         if command.done:
             break
     return controller.final_grasp() if episode.interruption() is None else None
-
-
-def controller_seed(seed: int, attempt: int = 0) -> int:
-    """Seed that the controller of an episode's attempt is told; the scene cannot be built from it."""
-    stream = [seed, _CONTROLLER_STREAM, attempt] if attempt else [seed, _CONTROLLER_STREAM]
-    return int(np.random.default_rng(stream).integers(2**32))
 
 
 class Episode:
@@ -119,23 +101,15 @@ class Episode:
     ) -> None:
         self.config, self.seed, self.detector = config or EpisodeConfig(), seed, detector
         self.recorder = recorder or NullRecorder()
-        self.scene = build_scene(scene_config, seed)
-        self.simulation = Simulation(self.scene)
-        self.camera = WristCamera(
-            self.scene.model,
-            self.config.camera_backend,
-            DepthNoise() if self.config.noise else None,
-            crop=self.config.camera_crop,
-            colour=reads_colour(detector),
-        )
-        self.simulation.set_q(self._start_q())
-        self.driver = ArmDriver(self.simulation)
+        self.world = World(scene_config, seed, self.config, colour=reads_colour(detector))
+        self.scene, self.simulation = self.world.scene, self.world.simulation
+        self.camera, self.driver = self.world.camera, self.world.driver
         self.ticks = 0
         """Control ticks, of all attempts."""
         self.frame: DepthFrame | None = None
-        """What the camera saw at the last look."""
+        """Image of the last look."""
         self._grasp_map: GraspMap | None = None
-        self._times: dict[str, list[float]] = defaultdict(list)
+        self._clock = StageClock()
         self._last_record = -np.inf
         self.recorder.start(self.simulation)
         self.begin()
@@ -151,10 +125,9 @@ class Episode:
         self.detector.reset(self.scene.height_map(data=self.simulation.data) if truth else None)
 
     def look(self) -> Observation:
-        """The view of this tick. Its noise depends on seed and tick alone: looking twice shows the same."""
-        rng = np.random.default_rng([self.seed, _NOISE_STREAM, self.ticks])
+        """Return the view of this tick; its noise depends on seed and tick alone, not on earlier looks."""
         with self.timed("render"):
-            self.frame = self.camera.capture(self.simulation.data, rng)
+            self.frame = self.camera.capture(self.simulation.data, noise_rng(self.seed, self.ticks))
         with self.timed("detect"):
             self._grasp_map = self.detector.predict(self.frame)
         time_s = self.simulation.time - self.start_time
@@ -166,19 +139,19 @@ class Episode:
         )
 
     def act(self, command: Command, diagnostics: Mapping[str, FloatArray | float | bool]) -> None:
-        """Do until the next tick what was commanded; nothing but the gripper moves where that is done."""
+        """Follow a command until the next tick; of one that is done, nothing but the gripper moves."""
         self.ticks += 1
         self.simulation.open_gripper(command.gripper)
         before = self.driver.statistics()
         if not command.done:
             self.driver.drive(command.twist, self.config.control_dt, self.metrics.tick)
             after = self.driver.statistics()
-            self._times["ik"].append(after.ik_seconds - before.ik_seconds)
-            self._times["physics"].append(after.physics_seconds - before.physics_seconds)
+            self._clock.add("ik", after.ik_seconds - before.ik_seconds)
+            self._clock.add("physics", after.physics_seconds - before.physics_seconds)
         self._record("reach", self.frame, self._grasp_map, diagnostics)
 
     def interruption(self) -> Outcome | None:
-        """What ended the reach before a grasp, if anything: reflex or timeout."""
+        """Return what ended the reach before a grasp, if anything: reflex or timeout."""
         if self.driver.reflex is not None:
             return Outcome.REFLEX
         late = self.simulation.time - self.start_time >= self.config.max_reach_time
@@ -209,30 +182,17 @@ class Episode:
         if self.simulation.time - self._last_record >= _TICK_PERIOD - 1e-6:
             self._record(phase, None, None, {})
 
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        """Count the wall time of a `with` block to one of `STAGES`."""
+        return self._clock.timed(stage)
+
     def timing(self) -> dict[str, float]:
-        """Median wall time of each stage of a tick so far [ms]."""
-        return {stage: 1e3 * float(np.median(self._times[stage] or [0.0])) for stage in STAGES}
+        """Return the median wall time of each stage of a tick so far [ms]."""
+        return self._clock.medians()
 
     def close(self) -> None:
         """Free the camera."""
-        self.camera.close()
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        """Count the wall time of the block to one of `STAGES`."""
-        clock = time.perf_counter()
-        yield
-        self._times[stage].append(time.perf_counter() - clock)
-
-    def _start_q(self) -> FloatArray:
-        """Arm posture that puts the camera over the jittered start, looking straight down."""
-        rng = np.random.default_rng([self.seed, _START_STREAM])
-        jitter = np.clip(rng.standard_normal(2), -2, 2) * self.config.start_jitter
-        simulation = self.simulation
-        T_tcp_camera = invert(simulation.T_world_tcp) @ self.camera.pose(simulation.data)
-        T = looking_down([*(np.array(WORKSPACE_CENTRE) + jitter), self.config.start_height])
-        T[:2, 3] -= (T[:3, :3] @ T_tcp_camera[:3, 3])[:2]
-        return solve_pose(simulation.q, T)
+        self.world.close()
 
     def _result(self, outcome: Outcome, lifted: str | None, reach: MotionStatistics) -> EpisodeResult:
         whole = self.driver.statistics()
@@ -255,7 +215,7 @@ class Episode:
         )
 
     def _target(self) -> str:
-        """The object nearest to the chosen grasp; the scene's first where there is none."""
+        """Return the object nearest to the chosen grasp; the scene's first where there is none."""
         if self._grasp is None:
             return self.scene.objects[0]
         position = self._grasp.position[:2]

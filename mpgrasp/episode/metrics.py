@@ -1,4 +1,4 @@
-"""How the reach went, measured apart from whether it ended well: smoothness, first detection, blind drift.
+"""Metrics of the reach, apart from whether it ended well: smoothness, first detection, blind drift.
 
 Smoothness is the spectral arc length of the tool's speed (Balasubramanian, Melendez-Calderon, Roby-Brami
 and Burdet, "On the analysis of movement smoothness", J. NeuroEngineering and Rehabilitation 12:112, 2015),
@@ -7,11 +7,15 @@ which, unlike jerk, depends neither on how long a motion takes nor on how fast i
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import PEAK_QUALITY, GraspMap, peak_height
-from mpgrasp.motion.arm_driver import ArmDriver
+
+if TYPE_CHECKING:
+    from mpgrasp.motion.arm_driver import ArmDriver
 
 DETECTION_QUALITY = PEAK_QUALITY
 """Peak of the quality map above which something counts as detected, whatever a controller's threshold is."""
@@ -24,7 +28,7 @@ PADDING = 4
 
 
 def spectral_arc_length(speed: FloatArray, rate: float) -> float:
-    """Smoothness of a motion, below 0; a single bell-shaped movement has about -1.4 to -1.6.
+    """Return the smoothness of a motion, below 0; a single bell-shaped movement has about -1.4 to -1.6.
 
     Args:
         speed: (n,) magnitudes of velocity, any unit.
@@ -59,12 +63,12 @@ class ReachMetrics:
         self._dt = np.nan
 
     def look(self, time: float, grasp_map: GraspMap) -> None:
-        """A view of the scene, `time` after the start [s]."""
+        """Take a view of the scene into account, `time` after the start [s]."""
         if self.first_detection_s is None and peak_height(grasp_map.quality) > DETECTION_QUALITY:
             self.first_detection_s = time
 
     def tick(self, driver: ArmDriver) -> None:
-        """A tick of the velocity loop; can be handed to `ArmDriver.drive`."""
+        """Take a tick of the velocity loop into account; can be handed to `ArmDriver.drive`."""
         velocity, self._dt = driver.twist_achieved[:3], driver.config.dt
         self._speeds.append(float(np.linalg.norm(velocity)))
         if self.first_detection_s is None:

@@ -1,4 +1,4 @@
-"""How an episode ended, and what was measured along the way."""
+"""Results of episodes: their endings, and what was measured along the way."""
 
 from __future__ import annotations
 
@@ -7,20 +7,24 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpgrasp.files.json_values import plain
-from mpgrasp.grasp import Grasp
-from mpgrasp.motion.reflex import Reflex
 from mpgrasp.outcome import Outcome
 
+if TYPE_CHECKING:
+    from mpgrasp.grasp import Grasp
+    from mpgrasp.motion.reflex import Reflex
+
 REACH = ("path_length_m", "jerk_rms", "spectral_arc_length", "first_detection_s", "blind_drift_m")
-"""What an `EpisodeResult` says of how the arm moved during its reach."""
+"""Fields of an `EpisodeResult` that say how the arm moved during its reach."""
+MOTION = ("min_singular_value", "near_singularity_s", *REACH)
+"""Fields that say how the arm moved, from the start to the end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EpisodeResult:
-    """What happened in one episode."""
+    """Result of one episode."""
 
     outcome: Outcome
     object: str
@@ -54,12 +58,12 @@ class EpisodeResult:
 
     @property
     def success(self) -> bool:
-        """Whether an object was lifted, held and shaken without being lost."""
+        """True if an object was lifted, held and shaken without being lost."""
         return self.outcome is Outcome.SUCCESS
 
     def as_record(self) -> dict[str, Any]:
-        """A JSON-ready dict with one key per field and `success`; floats have 9 digits."""
-        return plain(
+        """Return a JSON-ready dict with one key per field and `success`; floats have 9 digits."""
+        record: dict[str, Any] = plain(
             {
                 **{name: getattr(self, name) for name in self.__dataclass_fields__},
                 "outcome": self.outcome.value,
@@ -68,6 +72,7 @@ class EpisodeResult:
                 "grasp": None if self.grasp is None else asdict(self.grasp),
             }
         )
+        return record
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,12 +82,12 @@ class Pick:
     result: EpisodeResult
     """Judged by where the object is in the end: a success lies in the basket."""
     start_s: float
-    """When the reach began, since the episode did [s]."""
+    """Time at which the reach began, since the start of the episode [s]."""
     end_s: float
-    """When the arm was back at its start [s]."""
+    """Time at which the arm was back at its start [s]."""
 
     def as_record(self) -> dict[str, Any]:
-        """JSON-ready: what stands in the line of a single grasp, but for timing and state, with the times."""
+        """Return a JSON-ready dict: the keys of a single grasp but for timing and state, and the times."""
         record = self.result.as_record()
         for key in ("timing", "state_hash"):
             del record[key]
@@ -91,7 +96,7 @@ class Pick:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClearingResult:
-    """What happened in one episode in which a table was to be cleared."""
+    """Result of one episode in which a table was to be cleared."""
 
     outcome: Outcome
     """success: no object is left in the workspace; timeout; or no_grasp: nothing more was found to grasp."""
@@ -121,7 +126,7 @@ class ClearingResult:
 
     @property
     def success(self) -> bool:
-        """Whether the table is clear, be it that objects were knocked off it."""
+        """True if the table is clear, be it that objects were knocked off it."""
         return self.outcome is Outcome.SUCCESS
 
     @property
@@ -131,7 +136,7 @@ class ClearingResult:
         return dict(sorted(causes.items()))
 
     def as_record(self) -> dict[str, Any]:
-        """A JSON-ready dict with the keys of a single grasp's, and those of a clearing.
+        """Return a JSON-ready dict with the keys of a single grasp's, and those of a clearing.
 
         How the arm moved (`REACH`) are medians over the attempts in which it was measured; `reflex` is the
         first stop.
@@ -143,7 +148,7 @@ class ClearingResult:
         names = ("sim_time_s", "time_limit_s", "ticks", "min_singular_value", "near_singularity_s",
                  "in_basket", "knocked_off", "left", "failures", "timing", "state_hash")  # fmt: skip
         stops = [{**asdict(stop), "text": str(stop)} for stop in self.stops]
-        return plain(
+        record: dict[str, Any] = plain(
             {
                 **{name: getattr(self, name) for name in names},
                 **{key: median(values) if values else None for key, values in reaches.items()},
@@ -156,8 +161,9 @@ class ClearingResult:
                 "picks": [pick.as_record() for pick in self.picks],
             }
         )
+        return record
 
 
 def _is_measured(value: float | None) -> bool:
-    """Neither None nor NaN, which no median can be taken of."""
+    """True for what a median can be taken of: neither None nor NaN."""
     return value is not None and math.isfinite(value)

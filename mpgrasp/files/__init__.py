@@ -1,1 +1,1 @@
-"""What is written to disk, and how."""
+"""Files on disk: how they are read and written."""

@@ -1,18 +1,16 @@
-"""Writes a file as a whole: whatever happens, its name leads to the old content or to the new one."""
+"""Files that are written as a whole: whatever happens, a name leads to the old content or to the new one."""
 
 from __future__ import annotations
 
 import os
 import secrets
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
 def replace_file(file: Path, content: str | bytes) -> None:
     """Write a file, or put new content in the place of what is there; it is on the disk on return.
-
-    Several processes may write the same file at a time: the last one's content stays, and no reader ever
-    sees half of one.
 
     Args:
         file: in a folder that exists.
@@ -21,12 +19,27 @@ def replace_file(file: Path, content: str | bytes) -> None:
     Raises:
         OSError: it cannot be written. What was there before is still there, and nothing else is.
     """
-    data = content.encode() if isinstance(content, str) else content
-    temporary = file.with_name(f".{file.name}.{secrets.token_hex(4)}.tmp")
+    with replacing(file) as temporary, temporary.open("xb") as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def replacing(file: Path) -> Iterator[Path]:
+    """Give a name beside a file to write to; what is there takes the file's place if the block ends well.
+
+    Several processes may write the same file at a time: the last one's content stays, and no reader ever
+    sees half of one.
+
+    Args:
+        file: in a folder that exists. The name given out has its suffix.
+
+    Raises:
+        OSError: it cannot be put on the disk. What was there before is still there, and nothing else is.
+    """
+    temporary = file.with_name(f".{secrets.token_hex(4)}.{file.name}")
     try:
-        with temporary.open("xb") as stream:
-            stream.write(data)
-            stream.flush()
+        yield temporary
+        with temporary.open("rb") as stream:
             os.fsync(stream.fileno())
         os.replace(temporary, file)
     except BaseException:

@@ -12,7 +12,7 @@ from mpgrasp.files.atomic import replace_file
 
 
 def load_result(kind: str, key: str) -> dict[str, Any] | None:
-    """What was stored; None where nothing was, or what is there cannot be read.
+    """Return what was stored; None where nothing was, or what is there cannot be read.
 
     Args:
         kind: folder in the cache folder.

@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 SIGNIFICANT_DIGITS = 9
-"""Of floats in result files: more than anything here is measured to, fewer than the last bits."""
+"""Digits of floats in result files: more than anything here is measured to, fewer than the last bits."""
 
 
 def plain(value: Any) -> Any:
-    """JSON-ready copy: dataclasses and mappings as dicts, arrays and sequences as lists.
+    """Return a JSON-ready copy: dataclasses and mappings as dicts, arrays, sequences and sets as lists.
 
-    Floats keep `SIGNIFICANT_DIGITS`; NaN and infinities become None. What has no plain form is given
+    Floats keep `SIGNIFICANT_DIGITS`; NaN and infinities become None. What JSON has no form for is given
     by the name of its class, which is the same in every process.
     """
-    if value is None or (isinstance(value, bool | int | str) and not isinstance(value, Enum)):
-        return value
-    if isinstance(value, Enum):
-        return plain(value.value)
-    if isinstance(value, float | np.floating):
-        number = float(value)
-        return float(f"{number:.{SIGNIFICANT_DIGITS}g}") if math.isfinite(number) else None
-    if isinstance(value, np.bool_ | np.integer):
-        return value.item()
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    return _rounded(msgspec.to_builtins(value, str_keys=True, enc_hook=_builtin, order="deterministic"))
+
+
+def _rounded(value: Any) -> Any:
+    """Return a value made of builtins with shorter floats, and with lists for tuples."""
+    if isinstance(value, float):
+        return float(f"{value:.{SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _builtin(value: Any) -> Any:
+    """Return what stands for a value that msgspec does not know."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
     if isinstance(value, Mapping):
-        return {str(plain(key)): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, set | frozenset):
-        return sorted((plain(item) for item in value), key=str)
+        return dict(value)
     if isinstance(value, Path):
         return str(value)
     kind = value if isinstance(value, type) or callable(value) else type(value)
@@ -48,12 +46,12 @@ def plain(value: Any) -> Any:
 
 
 def one_line(record: Mapping[str, Any]) -> str:
-    """A record as one line of JSON with sorted keys and a line end: equal records, equal bytes."""
+    """Return a record as one line of JSON with sorted keys and a line end: equal records, equal bytes."""
     return json.dumps(plain(record), sort_keys=True, allow_nan=False, separators=(", ", ": ")) + "\n"
 
 
 class Difference(NamedTuple):
-    """A place in which two plain values differ."""
+    """A place in which two JSON values differ."""
 
     path: str
     """Keys and numbers of items on the way to it, with dots between them."""
@@ -61,12 +59,12 @@ class Difference(NamedTuple):
     b: Any
 
     def words(self, a: str, b: str) -> str:
-        """Both values in JSON, each with where or when it was found behind it: "seed: 0 then, 1 now"."""
+        """Return both values in JSON, each with its place or time behind it: "seed: 0 then, 1 now"."""
         return f"{self.path}: {json.dumps(self.a)} {a}, {json.dumps(self.b)} {b}"
 
 
 def difference(a: Any, b: Any, where: str = "") -> Difference | None:
-    """The first place in which two plain values differ; None if equal.
+    """Return the first place in which two JSON values differ; None if equal.
 
     Lists of dicts are gone through item by item if they are of one length; other lists are given as a whole.
     A key that one of them lacks is None there.

@@ -1,4 +1,4 @@
-"""What detectors make of one depth image, side by side, as in the paper's Figs. 4, 7 and 12.
+"""Pictures of what detectors make of one depth image, side by side, as in the paper's Figs. 4, 7 and 12.
 
 A column per detector; from the top: its input, Q, the opening W, the angle Theta, and the best rectangles
 after non-maximum suppression in Fig. 7's order of colours.
@@ -18,14 +18,12 @@ from mpgrasp.depth import DepthFrame
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap, GraspRectangle, best_pixel, peaks
-from mpgrasp.recording.false_colour import shade, shade_depth, shade_lines
-
-Picture = NDArray[np.uint8]
+from mpgrasp.recording.false_colour import Picture, shade, shade_depth, shade_lines
 
 RECTANGLES = 5
 """Grasps that are drawn at most."""
 DISTANCE = 20.0
-"""Of two peaks that are closer than this, the better one is drawn [px of the grasp map]."""
+"""Distance of two peaks below which only the better one is drawn [px of the grasp map]."""
 THRESHOLD = 0.1
 """Peaks of Q up to this are not drawn."""
 OPENING = 0.08
@@ -42,18 +40,18 @@ _LINE = 19  # [px]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DetectorView:
-    """What one detector made of a frame, and in what time."""
+class Prediction:
+    """Grasp map that one detector made of a frame, and its time."""
 
     name: str
     grasp_map: GraspMap
     milliseconds: float
-    """Of one `predict`, once the detector is warm [ms]."""
+    """Time of one `predict`, once the detector is warm [ms]."""
     first_milliseconds: float
-    """Of the first `predict` [ms]."""
+    """Time of the first `predict` [ms]."""
 
     def lines(self) -> tuple[str, ...]:
-        """Name, best quality, time and the top grasp in the world, in words."""
+        """Return name, best quality, time and the top grasp in the world, in words."""
         quality = self.grasp_map.quality
         finite = quality[np.isfinite(quality)]
         best = f"{finite.max():.2f}" if finite.size else "none"
@@ -71,7 +69,7 @@ class DetectorView:
 
 
 def top_grasps(grasp_map: GraspMap, *, count: int = RECTANGLES) -> list[tuple[Grasp, GraspRectangle]]:
-    """The best grasps in the world and in the image, best first, after non-maximum suppression.
+    """Return the best grasps in the world and in the image, best first, after non-maximum suppression.
 
     The first is the one that the loop would choose from this map. Their centres are `DISTANCE` or more apart.
     """
@@ -83,24 +81,26 @@ def top_grasps(grasp_map: GraspMap, *, count: int = RECTANGLES) -> list[tuple[Gr
     return [(grasp, grasp_map.rectangle_of(grasp)) for grasp in grasps]
 
 
-def side_by_side(frame: DepthFrame, views: Sequence[DetectorView], caption: Sequence[str] = ()) -> Picture:
-    """Picture (H, W, 3) of a frame and what the detectors made of it, a column for each.
+def side_by_side(
+    frame: DepthFrame, predictions: Sequence[Prediction], caption: Sequence[str] = ()
+) -> Picture:
+    """Return the picture (H, W, 3) of a frame and what the detectors made of it, a column for each.
 
     Args:
         frame: what all of them saw.
-        views: one per detector.
+        predictions: one per detector.
         caption: up to four short lines for the corner.
 
     Raises:
-        ConfigError: no view at all.
+        ConfigError: no prediction at all.
     """
-    if not views:
-        raise ConfigError("nothing to draw", got=0, allowed="one detector's view or more")
+    if not predictions:
+        raise ConfigError("nothing to draw", got=0, allowed="one detector's prediction or more")
     step = _SIDE + _GAP
-    sheet = np.full((_HEAD + len(_ROWS) * step, _MARGIN + len(views) * step, 3), _PAPER, np.uint8)
-    for k, view in enumerate(views):
+    sheet = np.full((_HEAD + len(_ROWS) * step, _MARGIN + len(predictions) * step, 3), _PAPER, np.uint8)
+    for k, prediction in enumerate(predictions):
         left = _MARGIN + k * step
-        for m, panel in enumerate(_panels(frame, view.grasp_map)):
+        for m, panel in enumerate(_panels(frame, prediction.grasp_map)):
             sheet[_HEAD + m * step :, left:][:_SIDE, :_SIDE] = panel
     for m, legend in ((1, _bar()), (2, _bar()), (3, _wheel())):
         height, width = legend.shape[:2]
@@ -108,14 +108,14 @@ def side_by_side(frame: DepthFrame, views: Sequence[DetectorView], caption: Sequ
     image = Image.fromarray(sheet)
     draw = ImageDraw.Draw(image)
     _write(draw, 8, 4, caption)
-    for k, view in enumerate(views):
-        _write(draw, _MARGIN + k * step, 4, view.lines())
+    for k, prediction in enumerate(predictions):
+        _write(draw, _MARGIN + k * step, 4, prediction.lines())
     _write_legends(draw, step)
     return np.asarray(image, np.uint8)
 
 
 def _panels(frame: DepthFrame, grasp_map: GraspMap) -> list[Picture]:
-    """The five pictures (_SIDE, _SIDE, 3) of a column."""
+    """Return the five pictures (_SIDE, _SIDE, 3) of a column."""
     depth = np.where(_holes(frame, grasp_map), np.nan, grasp_map.depth)
     return [
         _fit(shade_depth(depth)),
@@ -127,7 +127,7 @@ def _panels(frame: DepthFrame, grasp_map: GraspMap) -> list[Picture]:
 
 
 def _holes(frame: DepthFrame, grasp_map: GraspMap) -> NDArray[np.bool_]:
-    """Pixels (H, W) of the map that the camera had no return for, filled in since."""
+    """Return the pixels (H, W) of the map that the camera had no return for, filled in since."""
     seen, k = frame.intrinsics, grasp_map.intrinsics
     col = np.rint((np.arange(k.width) - k.cx) / k.fx * seen.fx + seen.cx).astype(int)
     row = np.rint((np.arange(k.height) - k.cy) / k.fy * seen.fy + seen.cy).astype(int)
@@ -163,7 +163,7 @@ def _bar() -> Picture:
 
 
 def _wheel() -> Picture:
-    """A disc in which every direction has the colour of the grasps that close along it."""
+    """Return a disc in which every direction has the colour of the grasps that close along it."""
     y, x = np.mgrid[-45:46, -45:46]
     disc = shade_lines(np.arctan2(-y, x), np.ones(x.shape))
     disc[np.hypot(x, y) > 45] = _PAPER

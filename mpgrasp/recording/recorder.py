@@ -1,4 +1,4 @@
-"""What an episode tells a recorder, the recorder that keeps nothing and the one that tells several others."""
+"""Recorders of episodes: what they are told, one that keeps nothing, and one that tells several others."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class TickRecord:
     grasp: Grasp | None
     """The grasp in hand, once one is chosen."""
     event: str | None = None
-    """A reflex or an outcome, in words."""
+    """Reflex or outcome, in words."""
 
 
 class Recorder(Protocol):
@@ -87,6 +87,8 @@ class TeeRecorder:
 def claim_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:
     """Make sure, before an episode is played, that its recording can be written; creates directories.
 
+    What is there already stays as it is, and a file that is not there does not come to be.
+
     Raises:
         OutputError: another suffix, or a place that cannot be written.
     """
@@ -95,8 +97,11 @@ def claim_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:
         raise OutputError("unknown kind of recording", got=str(path), allowed=suffixes)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("wb"):
+        is_new = not path.exists()
+        with path.open("ab"):
             pass
+        if is_new:
+            path.unlink()
     except OSError as error:
         raise OutputError(
             f"a recording cannot be written: {error.strerror}", got=str(path), allowed="a writable directory"

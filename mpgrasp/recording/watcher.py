@@ -5,29 +5,20 @@ from __future__ import annotations
 import cv2
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from mpgrasp.camera.ray_caster import cast_rays
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.geometry import FloatArray, look_at
-
-Picture = NDArray[np.uint8]
-
+from mpgrasp.recording.false_colour import Picture
 
 VIEWPOINT = look_at([1.40, -0.95, 0.85], [0.38, 0.02, 0.27], x_axis=(0.97, 1.02, 0.0))
 """Pose (4, 4) of the camera that watches the scene."""
-
-
-VIEW = (352, 312)  # [px], the watching camera's picture
-
+VIEW = (352, 312)
+"""Width and height of the watching camera's pictures [px]."""
 
 _FOCAL = 1.15  # of the watching camera, in widths of its picture
-
-
 _SUN = np.array([0.35, -0.45, 0.82])
-
-
 _SKY = (40, 44, 52)
 
 
@@ -39,7 +30,7 @@ class Watcher:
         self._camera = WristCamera(model, backend, None, intrinsics=_view_intrinsics(1.0))
 
     def picture(self, data: mujoco.MjData, T_world_camera: FloatArray = VIEWPOINT) -> Picture:
-        """Colour picture of the scene as it is now."""
+        """Return a picture (312, 352, 3) of the scene as it is now."""
         if self._camera.backend == "gl":
             picture = self._camera.rgb(data, T_world_camera)
             picture[(picture == 0).all(axis=-1)] = _SKY  # where GL drew nothing

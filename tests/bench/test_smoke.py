@@ -46,7 +46,7 @@ def test_one_real_episode_leaves_a_whole_run(camera: str, tmp_path: Path) -> Non
     assert run["physics"]["timestep"] == 0.002
     assert json.loads((tmp_path / "a" / "summary.json").read_text())["complete"]
     recordings = list((tmp_path / "a" / "recordings").iterdir())
-    assert {".rrd", ".gif"} <= {file.suffix for file in recordings}
+    assert {".rrd", ".gif", ".mp4"} <= {file.suffix for file in recordings}
     assert all(file.stat().st_size > 1000 for file in recordings)
 
 

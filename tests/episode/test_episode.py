@@ -13,7 +13,9 @@ from mpgrasp.camera.rasteriser import require_gl
 from mpgrasp.controllers import make_controller
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors import make_detector
-from mpgrasp.episode.episode import Episode, EpisodeConfig, run_episode
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.episode import Episode, run_episode
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.outcome import Outcome
@@ -45,7 +47,7 @@ def depth_of(episode: Episode) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def oracle() -> object:
+def oracle() -> GraspDetector:
     return make_detector("oracle")
 
 
@@ -79,7 +81,7 @@ def test_a_detector_that_reads_colour_gets_it_or_the_episode_does_not_start() ->
     np.testing.assert_array_equal(depth_of(start(0)), depth)  # colour changes nothing about the depth
 
 
-def test_the_same_seed_gives_the_same_record_but_for_timing(oracle) -> None:
+def test_the_same_seed_gives_the_same_record_but_for_timing(oracle: GraspDetector) -> None:
     records = []
     for _ in range(2):
         result = run_episode(SCENE, 0, detector=oracle, controller=make_controller("mppc"), config=QUICK)
@@ -88,14 +90,14 @@ def test_the_same_seed_gives_the_same_record_but_for_timing(oracle) -> None:
     assert records[0]["success"] is True
 
 
-def test_a_record_survives_json_unchanged(oracle) -> None:
+def test_a_record_survives_json_unchanged(oracle: GraspDetector) -> None:
     result = run_episode(SCENE, 1, detector=oracle, controller=make_controller("open_loop"))
     record = result.as_record()
     assert json.loads(json.dumps(record, allow_nan=False)) == record
     assert record["grasp"] is not None
 
 
-def test_scene_start_and_noise_are_the_same_whatever_the_detector(oracle) -> None:
+def test_scene_start_and_noise_are_the_same_whatever_the_detector(oracle: GraspDetector) -> None:
     frames = []
     for detector in (Blind(), oracle):
         episode = Episode(SCENE, 5, detector=detector)

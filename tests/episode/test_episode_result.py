@@ -3,9 +3,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from mpgrasp.outcome import Outcome
-
 from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
+from mpgrasp.outcome import Outcome
 
 ATTEMPT = EpisodeResult(
     outcome=Outcome.SUCCESS, object="o", sim_time_s=5.0, ticks=50, reflex=None, min_singular_value=0.1,

@@ -14,18 +14,18 @@ from height_maps import height_map
 from PIL import Image
 
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
-from mpgrasp.detectors.__main__ import make_parser
+from mpgrasp.detectors.__main__ import main
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import GraspMap, best_pixel
-from mpgrasp.inspection.pictures import DISTANCE, RECTANGLES, DetectorView, side_by_side, top_grasps
-from mpgrasp.inspection.show import View, main, timed_view
+from mpgrasp.inspection.pictures import DISTANCE, RECTANGLES, Prediction, side_by_side, top_grasps
+from mpgrasp.inspection.viewpoint import Viewpoint, timed_prediction
 from mpgrasp.recording.false_colour import HOLE
 
 INTRINSICS = CameraIntrinsics(fx=240.0, fy=240.0, cx=111.5, cy=111.5, width=224, height=224)
 POSE = looking_down([0.5, 0.0, 0.5])
 BLUE = (60, 140, 255)
-"""Of the best rectangle, as in the paper's Fig. 7."""
+"""Colour of the best rectangle, as in the paper's Fig. 7."""
 
 
 def frame(depth: FloatArray | None = None) -> DepthFrame:
@@ -44,8 +44,8 @@ def grasp_map(quality: FloatArray, depth: float = 0.5) -> GraspMap:
     )
 
 
-def view(quality: FloatArray, name: str = "some") -> DetectorView:
-    return DetectorView(name=name, grasp_map=grasp_map(quality), milliseconds=1.0, first_milliseconds=2.0)
+def view(quality: FloatArray, name: str = "some") -> Prediction:
+    return Prediction(name=name, grasp_map=grasp_map(quality), milliseconds=1.0, first_milliseconds=2.0)
 
 
 def count(picture: np.ndarray, colour: tuple[int, ...]) -> int:
@@ -92,7 +92,7 @@ def test_a_map_that_says_nothing_has_no_grasp_and_no_rectangle(quality: FloatArr
 
 def test_pixels_without_depth_have_no_grasp() -> None:
     assert top_grasps(grasp_map(NOISE, depth=np.nan)) == []
-    blind = DetectorView(
+    blind = Prediction(
         name="blind", grasp_map=grasp_map(EMPTY, depth=np.nan), milliseconds=1.0, first_milliseconds=1.0
     )
     side_by_side(frame(np.full((224, 224), np.nan)), [blind])
@@ -130,7 +130,7 @@ def test_the_first_call_is_told_apart_from_the_warm_ones() -> None:
 
     counts = Counts()
     counts.reset(height_map())
-    timed = timed_view("counts", counts, frame())
+    timed = timed_prediction("counts", counts, frame())
     assert counts.calls > 3
     assert timed.first_milliseconds > 0
     assert timed.milliseconds > 0
@@ -139,7 +139,7 @@ def test_the_first_call_is_told_apart_from_the_warm_ones() -> None:
 @pytest.mark.parametrize("height", [0.0, -0.1, 1.5, np.nan, np.inf])
 def test_a_height_that_cannot_be_is_refused(height: float) -> None:
     with pytest.raises(ConfigError, match="height"):
-        View(height=height)
+        Viewpoint(height=height)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_height_that_cannot_be_is_refused(height: float) -> None:
 def test_unusable_input_is_one_line_and_exit_code_2(
     command: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(make_parser(), command) == 2
+    assert main(command) == 2
     error = capsys.readouterr().err
     assert error.startswith("mpgrasp: error: ")
     assert error.count("\n") == 1
@@ -181,12 +181,12 @@ def test_a_card_tells_the_network_and_how_it_was_trained(
     save_weights(
         file, NetworkWeights(name="ggcnn2", network=network, settings={}, card={"loss": {"beta": 0.2}})
     )
-    assert main(make_parser(), ["card", "ggcnn2", "--weights", str(file)]) == 0
+    assert main(["card", "ggcnn2", "--weights", str(file)]) == 0
     printed = capsys.readouterr().out
     assert "network: ggcnn2\n" in printed
     assert f"parameters: {sum(p.numel() for p in network.parameters())}\n" in printed
     assert "training:\n  loss:\n    beta: 0.2\n" in printed
-    assert main(make_parser(), ["card", "dhrnet", "--weights", str(file)]) == 2
+    assert main(["card", "dhrnet", "--weights", str(file)]) == 2
     assert "another network" in capsys.readouterr().err
 
 

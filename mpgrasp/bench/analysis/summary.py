@@ -10,13 +10,8 @@ from typing import Any
 
 from mpgrasp.bench.analysis.pairing import pair
 from mpgrasp.bench.record import ERROR, Cells, by_cell
+from mpgrasp.episode.result import MOTION
 from mpgrasp.statistics import holm, mean_interval, median_interval, restricted, wilson_interval
-
-MOTION = (
-    "min_singular_value", "near_singularity_s", "path_length_m", "jerk_rms", "spectral_arc_length",
-    "first_detection_s", "blind_drift_m",
-)  # fmt: skip
-"""Keys of a line that say how the arm moved; a cell gives their medians over the lines that have them."""
 
 
 def summarise(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

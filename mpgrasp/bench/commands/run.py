@@ -124,7 +124,7 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="N",
         type=int,
         default=0,
-        help="record the first N episodes of each combination, for rerun and as GIF (default: 0)",
+        help="record the first N episodes of each combination, for rerun, as GIF and as MP4 (default: 0)",
     )
     add(
         "--weights",

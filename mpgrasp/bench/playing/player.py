@@ -97,7 +97,7 @@ class Player:
         from mpgrasp.recording.rerun import RerunRecorder
 
         stem = self.plan.recordings / task.stem
-        film = FilmRecorder(f"{stem}.gif", config=FilmConfig(backend=self.plan.camera))
+        film = FilmRecorder(f"{stem}.gif", f"{stem}.mp4", config=FilmConfig(backend=self.plan.camera))
         recorders: list[Recorder] = [RerunRecorder(f"{stem}.rrd"), film, *([trace] if trace else [])]
         return TeeRecorder(*recorders)
 

@@ -14,12 +14,11 @@ from mpgrasp.bench.report.document import Block, Folded, Listing, Paragraph, Tab
 from mpgrasp.bench.report.names import name_of
 from mpgrasp.bench.report.paper_tables import Rows, rate_text, time_text
 from mpgrasp.bench.results.runs import Run, Runs
+from mpgrasp.episode.stages import STAGES
 from mpgrasp.files.json_values import Difference, difference
 
 CARD = ("physics", "camera", "motion", "ik", "reflex")
 """Keys of run.json that make up the physics card."""
-STAGES = ("render", "detect", "control", "ik", "physics")
-"""What a control tick is made of, as in a line's `timing`."""
 _MOTION = (
     ("min_singular_value", "smallest singular value, median"),
     ("near_singularity_s", "near a singularity [s]"),

@@ -85,12 +85,12 @@ def test_stacked_is_a_table_to_be_cleared() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"trial": "juggle"}, "unknown trial; got 'juggle'; allowed: grasp, clear"),
+        ({"trial": "juggle"}, "trial is unusable; got 'juggle'; allowed: grasp, clear"),
         ({"trial": "clear"}, "clearing needs a basket"),
         ({"trials": 0}, "trials out of range; got 0"),
-        ({"trials": "many"}, "trials out of range"),
-        ({"scene": {"objects": [{"box": [0.1]}]}}, "size of a box"),
-        ({"scene": {"objects": [{"box": 0.1}]}}, "unusable box"),
+        ({"trials": "many"}, "trials is unusable; got 'many'"),
+        ({"scene": {"objects": [{"box": [0.1]}]}}, "box is unusable; got .*; allowed: a list of 3"),
+        ({"scene": {"objects": [{"box": 0.1}]}}, "box is unusable; got 0.1; allowed: a list of 3"),
         ({"scene": {"objects": [{"ball": 0.1}]}}, "unknown key; got 'ball'"),
     ],
 )

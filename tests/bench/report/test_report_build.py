@@ -16,12 +16,10 @@ from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.analysis.hypotheses import Verdict, evaluate
 from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Claim, Measure, reported
 from mpgrasp.bench.record import by_cell
-from mpgrasp.bench.report import tables as report_tables
 from mpgrasp.bench.report.build import write_report
 from mpgrasp.bench.report.document import Folded, Listing, Paragraph, Section, Table, to_html, to_markdown
 from mpgrasp.bench.report.paper_tables import hypothesis_blocks
 from mpgrasp.bench.results.trace import KEPT, prune_traces, read_trace
-from mpgrasp.episode.episode import STAGES
 from mpgrasp.exceptions import OutputError
 
 
@@ -241,10 +239,6 @@ def test_a_ticks_time_is_split_between_the_network_and_all_else(tmp_path: Path) 
     ]
     # three ticks with 8 ms and one with 4 ms of all else, of 40 ms
     assert "everything apart from network inference: 70.0 %" in text
-
-
-def test_the_stages_of_a_tick_are_those_of_an_episode() -> None:
-    assert report_tables.STAGES == STAGES
 
 
 def test_a_report_of_others_has_no_section_on_thickness(folder: Path) -> None:

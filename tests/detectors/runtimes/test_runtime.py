@@ -15,7 +15,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
-from mpgrasp.detectors.__main__ import make_parser
+from mpgrasp.detectors.__main__ import main
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.registry import build_network
@@ -27,8 +27,7 @@ from mpgrasp.detectors.runtimes.runtime import TorchRuntime, make_runtime, runti
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
 from mpgrasp.grasp import GraspMap
-from mpgrasp.inspection.runtime_check import Agreement, compare, grasps_apart, rendered_frames
-from mpgrasp.inspection.show import main
+from mpgrasp.inspection.agreement import Agreement, compare, grasps_apart, rendered_frames
 
 needs_openvino = pytest.mark.skipif(openvino_precision() is None, reason="no OpenVINO for this processor")
 SMALL = {"width": 4, "blocks": 1}
@@ -322,7 +321,7 @@ def test_the_check_command_tells_how_many_frames_agree(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command = ["check", "ggcnn2", "--frames", "4", "--runtime", "torch"]
-    assert main(make_parser(), command) == 0
+    assert main(command) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("ggcnn2: torch f32")
     assert "of plain torch on 4 of 4 frames (100.0 %)" in printed
@@ -331,7 +330,7 @@ def test_the_check_command_tells_how_many_frames_agree(
     monkeypatch.setattr(
         TorchRuntime, "__call__", lambda self, x: wrong(self, x) if "plain" in self.name else wrong(self, -x)
     )
-    assert main(make_parser(), command) == 1
+    assert main(command) == 1
 
 
 @pytest.mark.parametrize(
@@ -346,7 +345,7 @@ def test_the_check_command_tells_how_many_frames_agree(
 def test_unusable_input_is_one_line_and_exit_code_2(
     command: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(make_parser(), command) == 2
+    assert main(command) == 2
     error = capsys.readouterr().err
     assert error.startswith("mpgrasp: error: ")
     assert error.count("\n") == 1

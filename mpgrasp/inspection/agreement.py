@@ -1,4 +1,4 @@
-"""Whether a runtime finds the grasps that plain torch finds, over rendered images of a suite's scenes."""
+"""Agreement of a runtime's grasps with those of plain torch, over rendered images of a suite's scenes."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from mpgrasp.detectors.network_detector import NetworkDetector
 
 MAX_DISTANCE = 2.0
-"""Between the pixels of two top grasps that count as the same [px]."""
+"""Distance between the pixels of two top grasps that count as the same [px]."""
 MAX_ANGLE = np.deg2rad(3.0)
-"""Between their closing directions [rad]."""
+"""Angle between their closing directions [rad]."""
 MIN_SHARE = 0.95
-"""Of frames with the same top grasp in a runtime that may be used."""
+"""Share of frames with the same top grasp in a runtime that may be used."""
 
 _VIEWS = 4  # of each scene
 _CAMERA_HEIGHT = (0.22, 0.56)  # [m], from MP-PC's last look to its first
@@ -35,18 +35,18 @@ _STREAM = 31  # of the seed, beside those of scene and episode
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """How far the top grasps of two detectors lie apart, frame by frame, and what a frame costs."""
+    """Distance of the top grasps of two detectors, frame by frame, and time that a frame costs."""
 
     distance: FloatArray
-    """(n,) [px]; infinite where only one of them found a grasp."""
+    """(n,) distance [px]; infinite where only one of them found a grasp."""
     angle: FloatArray
-    """(n,) between the closing directions [rad]."""
+    """(n,) angle between the closing directions [rad]."""
     milliseconds: tuple[float, float]
     """Median of one `predict`, of each of the two [ms]."""
 
     @property
     def same(self) -> int:
-        """Frames with the same top grasp."""
+        """Number of frames with the same top grasp."""
         return int(((self.distance <= MAX_DISTANCE) & (self.angle <= MAX_ANGLE)).sum())
 
     @property
@@ -56,14 +56,14 @@ class Agreement:
 
     @property
     def good(self) -> bool:
-        """Whether that share is enough."""
+        """True if that share is enough."""
         return self.share >= MIN_SHARE
 
 
 def rendered_frames(
     suite: str, count: int, seed: int = 0, *, camera: str = "auto", colour: bool = False
 ) -> Iterator[DepthFrame]:
-    """Noisy images of a suite's scenes from over an object, at heights of the closed loop.
+    """Render noisy images of a suite's scenes from over an object, at heights of the closed loop.
 
     Raises:
         ConfigError: a suite or number that cannot be used.
@@ -92,7 +92,7 @@ def rendered_frames(
 
 
 def compare(detector: NetworkDetector, reference: NetworkDetector, frames: Sequence[DepthFrame]) -> Agreement:
-    """What two detectors make of the same frames, asked in turn."""
+    """Compare what two detectors, asked in turn, make of the same frames."""
     apart, times = [], []
     for detected in (detector, reference):
         detected.warm_up()
@@ -109,7 +109,7 @@ def compare(detector: NetworkDetector, reference: NetworkDetector, frames: Seque
 
 
 def grasps_apart(first: GraspMap, second: GraspMap) -> tuple[float, float]:
-    """Distance [px] and angle [rad] between the top grasps of two maps of one image."""
+    """Return the distance [px] and angle [rad] between the top grasps of two maps of one image."""
     found = [bool(grasp_map.quality.any()) for grasp_map in (first, second)]
     if not all(found):
         return (np.inf, np.pi / 2) if any(found) else (0.0, 0.0)
