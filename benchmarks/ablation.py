@@ -1,4 +1,4 @@
-"""What makes DHRNet good? Accuracy after ten epochs of its simpler relatives, and of its head's variants.
+"""Ablation of DHRNet: accuracy after ten epochs of its simpler relatives, and of its head's variants.
 
     python benchmarks/ablation.py architecture    # the paper's Fig. 8
     python benchmarks/ablation.py fusion          # the paper's Fig. 10, for depth, colour and both

@@ -13,193 +13,74 @@ the rule stands in reliability.py.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 import study
 from reliability import calibration, choose_threshold, draw_peaks, draw_reliability
+from single_view import Trial, execute, propose
 
 from mpgrasp.controllers.config import MppcConfig
-from mpgrasp.depth import DepthFrame
-from mpgrasp.detectors.detector import GraspDetector, reads_truth
-from mpgrasp.exceptions import ConfigError
-from mpgrasp.grasp import Grasp, best_pixel, peak_height
-from mpgrasp.motion.lift_trial import LiftRig
-from mpgrasp.scene.scene import Scene
-from mpgrasp.training.data.views import CAMERA_HEIGHT, make_scene, stored_intrinsics, stored_pose
+from mpgrasp.training.data.views import CAMERA_HEIGHT
 from mpgrasp.training.dataset import GraspDataset
-from mpgrasp.training.metrics import match_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Line = dict[str, Any]
 METRICS = ("lifted", "hit", "rectangle")
-GROUPS: dict[str, Callable[[Line], bool]] = {
-    "all": lambda line: True,
-    "thin": lambda line: line["thin"],
-    "thick": lambda line: not line["thin"],
-    "stacked": lambda line: line["stacked"],
-    "low": lambda line: _third(line) == 0,
-    "mid": lambda line: _third(line) == 1,
-    "high": lambda line: _third(line) == 2,
+GROUPS: dict[str, Callable[[Trial], bool]] = {
+    "all": lambda trial: True,
+    "thin": lambda trial: trial.thin,
+    "thick": lambda trial: not trial.thin,
+    "stacked": lambda trial: trial.stacked,
+    "low": lambda trial: _third(trial) == 0,
+    "mid": lambda trial: _third(trial) == 1,
+    "high": lambda trial: _third(trial) == 2,
 }
-"""Of views: thin scenes rise no higher than 13 mm, in stacked ones an object lies on another, the camera is
-in the lowest, middle or highest third of its heights."""
-STEEP = 0.5
-"""A contact carries when its normal is at least so much upright (its z component)."""
+"""Groups of views: thin scenes rise no higher than 13 mm, in stacked ones an object lies on another, the
+camera is in the lowest, middle or highest third of its heights."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Proposal:
-    """A detector's best grasp of an image, before it is executed."""
-
-    detector: str
-    image: int
-    scene: tuple[int, int]
-    """Seed of the data set, number of the scene."""
-    grasp: Grasp | None
-    """None where the quality is zero everywhere."""
-    line: Line
-    """What is known without executing it."""
-
-
-def propose(
-    detectors: Mapping[str, GraspDetector], dataset: GraspDataset, images: Iterable[int]
-) -> list[Proposal]:
-    """The best grasp of every detector in every image, judged against the labels."""
-    thin, height = (_column(dataset, name) for name in ("thin", "camera_height"))
-    told = any(map(reads_truth, detectors.values()))
-    proposals, before, truth = [], None, None
-    for i in images:
-        scene, sample = dataset.scene(i), dataset.sample(i)
-        if told and scene != before:
-            before, truth = scene, make_scene(*scene)[0].height_map()
-        frame = DepthFrame(
-            depth=sample.depth,
-            rgb=sample.rgb,
-            intrinsics=stored_intrinsics(),
-            T_world_camera=stored_pose(dataset.meta[i], dataset.columns),
-        )
-        for name, detector in detectors.items():
-            detector.reset(truth if reads_truth(detector) else None)
-            found = detector.predict(frame)
-            labels = sample.resized(len(found.quality))
-            verdict = match_labels(found.quality, found.angle, found.width, labels)
-            grasp = found.grasp_at(*best_pixel(found.quality))
-            line = {
-                "detector": name,
-                "image": i,
-                "scene": scene[1],
-                "camera_height": float(height[i]),
-                "thin": bool(thin[i] > 0.5),
-                "graspable": bool(sample.quality.any()),
-                "quality": grasp.quality,
-                "peak_height": peak_height(found.quality),
-                "hit": verdict.hit,
-                "rectangle": verdict.rectangle,
-            }
-            there = grasp.quality > 0 and bool(np.isfinite(grasp.position).all())
-            proposals.append(
-                Proposal(detector=name, image=i, scene=scene, grasp=grasp if there else None, line=line)
-            )
-    return proposals
-
-
-def _column(dataset: GraspDataset, name: str) -> np.ndarray:
-    values = dataset.column(name)
-    if values is None:
-        raise ConfigError("data without a column that the study needs", got=dataset.columns, allowed=name)
-    return values
-
-
-def execute(proposals: Sequence[Proposal], workers: int) -> list[Line]:
-    """Every proposal's line with its `outcome`, whether it `lifted`, and whether its scene is `stacked`."""
-    scenes: dict[tuple[int, int], list[int]] = {}
-    for k, proposal in enumerate(proposals):
-        scenes.setdefault(proposal.scene, []).append(k)
-    jobs = [(scene, [proposals[k].grasp for k in members]) for scene, members in scenes.items()]
-    lines: list[Line] = [{}] * len(proposals)
-    with multiprocessing.get_context("spawn").Pool(workers) if workers > 1 else _Here() as pool:
-        results = study.track(pool.imap(lift_all, jobs), "lifts", len(jobs))
-        for members, (stacked, outcomes) in zip(scenes.values(), results, strict=True):
-            for k, outcome in zip(members, outcomes, strict=True):
-                lifted = outcome == "success"
-                lines[k] = proposals[k].line | {"stacked": stacked, "outcome": outcome, "lifted": lifted}
-    return lines
-
-
-class _Here:
-    """A pool without processes."""
-
-    imap = staticmethod(map)
-
-    def __enter__(self) -> _Here:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-def lift_all(job: tuple[tuple[int, int], list[Grasp | None]]) -> tuple[bool, list[str]]:
-    """Whether things lie on each other in a scene, and the outcomes of grasps in it ("no_grasp" of None)."""
-    (seed, index), grasps = job
-    scene, _ = make_scene(seed, index)
-    rig = LiftRig(scene)
-    return is_stacked(scene), ["no_grasp" if g is None else rig.attempt(g).outcome for g in grasps]
-
-
-def is_stacked(scene: Scene) -> bool:
-    """Whether some object carries another in the settled scene."""
-    model, data = scene.model, scene.data()
-    mujoco.mj_forward(model, data)
-    owner = {model.body(name).id for name in scene.objects}
-    for contact in data.contact:
-        bodies = {int(model.geom_bodyid[g]) for g in contact.geom}
-        if len(bodies) == 2 and bodies <= owner and abs(contact.frame[2]) > STEEP:
-            return True
-    return False
-
-
-def accuracy(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def accuracy(trials: Sequence[Trial]) -> list[dict[str, Any]]:
     """A row per detector and group: the rates of `METRICS` over its views with a labelled grasp."""
     rows = []
-    for name, own in by_detector(lines).items():
+    for name, own in by_detector(trials).items():
         for group, belongs in GROUPS.items():
-            views = [line for line in own if line["graspable"] and belongs(line)]
-            rates = {metric: study.rate(sum(v[metric] for v in views), len(views)) for metric in METRICS}
+            views = [trial for trial in own if trial.graspable and belongs(trial)]
+            rates = {m: study.rate(sum(getattr(trial, m) for trial in views), len(views)) for m in METRICS}
             rows.append({"detector": name, "group": group, "n": len(views), **rates})
     return rows
 
 
-def _third(line: Line) -> int:
+def _third(trial: Trial) -> int:
     low, high = CAMERA_HEIGHT
-    return int(np.clip(3 * (line["camera_height"] - low) / (high - low), 0, 2))
+    return int(np.clip(3 * (trial.camera_height - low) / (high - low), 0, 2))
 
 
-def by_detector(lines: Iterable[Line]) -> dict[str, list[Line]]:
-    """Lines by detector, in order of appearance."""
-    own: dict[str, list[Line]] = {}
-    for line in lines:
-        own.setdefault(line["detector"], []).append(line)
+def by_detector(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
+    """Trials by detector, in order of appearance."""
+    own: dict[str, list[Trial]] = {}
+    for trial in trials:
+        own.setdefault(trial.detector, []).append(trial)
     return own
 
 
-def compare(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def compare(trials: Sequence[Trial]) -> list[dict[str, Any]]:
     """Exact McNemar tests between detectors for each metric and group, over views with a labelled grasp."""
     rows = []
     for metric in METRICS:
         for group, belongs in GROUPS.items():
-            views = [line for line in lines if line["graspable"] and belongs(line)]
-            answers = {name: [v[metric] for v in own] for name, own in by_detector(views).items()}
+            views = [trial for trial in trials if trial.graspable and belongs(trial)]
+            answers = {
+                name: [bool(getattr(trial, metric)) for trial in own]
+                for name, own in by_detector(views).items()
+            }
             rows += [{"metric": metric, "group": group, **row} for row in study.paired(answers)]
     return study.corrected(rows)
 
@@ -229,17 +110,17 @@ def _draw_accuracy(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     axes.legend(loc="lower left", fontsize=10)
 
 
-def analyse(lines: Sequence[Line], seed: int) -> dict[str, Any]:
+def analyse(trials: Sequence[Trial], seed: int) -> dict[str, Any]:
     """All results: accuracy, McNemar tests, calibration and threshold by detector, and one for all."""
-    own = by_detector(lines)
+    own = by_detector(trials)
     return {
-        "accuracy": accuracy(lines),
-        "mcnemar": compare(lines),
+        "accuracy": accuracy(trials),
+        "mcnemar": compare(trials),
         "calibration": {name: calibration(group) for name, group in own.items()},
         "thresholds": {
             name: choose_threshold(group, np.random.default_rng(seed)) for name, group in own.items()
         },
-        "common_threshold": choose_threshold(lines, np.random.default_rng(seed)),
+        "common_threshold": choose_threshold(trials, np.random.default_rng(seed)),
     }
 
 
@@ -284,15 +165,16 @@ def _study(command: Sequence[str]) -> None:
     order = dict.fromkeys(dataset.scene(i) for i in range(len(dataset)))
     chosen = set(list(order)[: options.scenes])
     images = [i for i in range(len(dataset)) if dataset.scene(i) in chosen]
-    lines = execute(
+    trials = execute(
         propose(detectors, dataset, study.track(images, "predictions", len(images))), options.workers
     )
-    results = {"scenes": len(chosen), "views": len(images), **analyse(lines, options.seed)}
+    results = {"scenes": len(chosen), "views": len(images), **analyse(trials, options.seed)}
+    rows = [asdict(trial) for trial in trials]
     about = study.about(
         "held_out", command, data=dataset.description(), peak_threshold=MppcConfig().peak_threshold,
         seed=options.seed, **who,
     )  # fmt: skip
-    study.publish(options.out, "held-out", about, results, lines, draw(results))
+    study.publish(options.out, "held-out", about, results, rows, draw(results))
     print(f"{len(chosen)} scenes, {len(images)} views.\n{table(results)}\nResults: {options.out}")
 
 

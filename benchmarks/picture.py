@@ -1,21 +1,27 @@
-"""`python benchmarks/picture.py`: the README picture, a filmstrip of the first `thin` episode."""
+"""Draw the picture of the README, a filmstrip of the first `thin` episode: `python benchmarks/picture.py`."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mpgrasp import make_controller, make_detector, run_episode
-from mpgrasp.recording.film import FilmRecorder
-from mpgrasp.suite import episode_seed, load_suite
+import study
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "episode.png"
 
 
-def main() -> None:
-    """Play the episode and write the picture."""
+def _study(command: Sequence[str]) -> None:
+    parser = study.Parser(description=__doc__)
+    parser.add_argument("--out", metavar="FILE", type=Path, default=PICTURE, help="default: docs/episode.png")
+    out: Path = parser.parse_args(command).out
+    from mpgrasp import make_controller, make_detector, run_episode
+    from mpgrasp.recording.film import FilmRecorder
+    from mpgrasp.suite import episode_seed, load_suite
+
     suite = load_suite("thin")
-    PICTURE.parent.mkdir(exist_ok=True)
+    study.prepare(out.parent)
     with TemporaryDirectory() as folder:
         result = run_episode(
             suite.scene_config(0),
@@ -23,10 +29,15 @@ def main() -> None:
             detector=make_detector("dhrnet"),
             controller=make_controller("mppc"),
             config=suite.episode_config(),
-            recorder=FilmRecorder(Path(folder) / "episode.gif", strip=PICTURE),
+            recorder=FilmRecorder(Path(folder) / "episode.gif", strip=out),
         )
-    print(f"{PICTURE}: {result.outcome}")
+    print(f"{out}: {result.outcome}")
+
+
+def main(command: Sequence[str] | None = None) -> int:
+    """Run the command line (`sys.argv` if not given) and return the exit code; 2 for unusable input."""
+    return study.run_command(_study, command)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

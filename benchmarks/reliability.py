@@ -1,7 +1,6 @@
-"""How far can a detector's quality be trusted? Calibration, and the threshold of MP-PC's exist_peak().
+"""Calibration of the quality that a detector claims, and the threshold of MP-PC's exist_peak().
 
-Both work on trials, one per detector and view: `quality` of the best grasp, `peak_height`, which exist_peak()
-holds against its threshold, `graspable` where there is a labelled grasp, `outcome`, `lifted` and `scene`.
+Both work on trials, one per detector and view (`single_view.Trial`).
 
 A view's peak is right when its grasp lifts, and false where it does not, be the table empty or the grasp
 wrong. Of the thresholds 0, 0.01 ... 1 the one with the greatest difference between the share of right peaks
@@ -23,27 +22,27 @@ from mpgrasp.geometry import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from single_view import Trial
 
-Line = Mapping[str, Any]
 BINS = 10
-"""Of equal width, over the claimed quality."""
+"""Number of bins of equal width over the claimed quality."""
 THRESHOLDS = np.linspace(0, 1, 101)
 FALSE_SHARE = 0.1
-"""Of the peaks that pass the careful threshold at most this share is false."""
+"""Largest share of false peaks among those that pass the careful threshold."""
 RESAMPLED = 1000
 """Bootstrap samples."""
 
 
-def calibration(lines: Iterable[Line]) -> dict[str, Any]:
-    """How well one detector's quality tells success, over the views in which it found a grasp.
+def calibration(trials: Iterable[Trial]) -> dict[str, Any]:
+    """Compare one detector's quality with its success, over the views in which it found a grasp.
 
     Keys: n; ece, the expected calibration error (mean distance between claimed quality and measured success
     over the bins, weighted by their views); brier, the mean squared error of the quality, and brier_constant,
     that of always claiming the mean success; mean_quality, success; bins with low, high, claimed and a rate.
     """
-    found = [line for line in lines if line["outcome"] != "no_grasp"]
-    quality = np.array([line["quality"] for line in found])
-    lifted = np.array([line["lifted"] for line in found], float)
+    found = [trial for trial in trials if trial.outcome != "no_grasp"]
+    quality = np.array([trial.quality for trial in found])
+    lifted = np.array([trial.lifted for trial in found], float)
     if not len(found):
         return {"n": 0, "bins": []}
     which = np.minimum((quality * BINS).astype(int), BINS - 1)
@@ -65,7 +64,7 @@ def calibration(lines: Iterable[Line]) -> dict[str, Any]:
     }
 
 
-def choose_threshold(lines: Sequence[Line], rng: np.random.Generator) -> dict[str, Any]:
+def choose_threshold(trials: Sequence[Trial], rng: np.random.Generator) -> dict[str, Any]:
     """exist_peak()'s threshold for the trials of one detector or several, by the rule of this file's head.
 
     Keys: threshold, low and high (95 % by bootstrap over scenes); youden; at it found (right peaks that pass,
@@ -73,9 +72,9 @@ def choose_threshold(lines: Sequence[Line], rng: np.random.Generator) -> dict[st
     wrong_of_passing; at_default, the same at MP-PC's default; careful, the same at the careful threshold,
     None where there is none; curve, the same at all thresholds.
     """
-    scenes, of_scene = np.unique([line["scene"] for line in lines], return_inverse=True)
-    passes = np.array([line["peak_height"] for line in lines])[:, None] > THRESHOLDS  # (n, thresholds)
-    right = np.array([line["lifted"] for line in lines])
+    scenes, of_scene = np.unique([trial.scene for trial in trials], return_inverse=True)
+    passes = np.array([trial.peak_height for trial in trials])[:, None] > THRESHOLDS  # (n, thresholds)
+    right = np.array([trial.lifted for trial in trials])
 
     def per_scene(values: np.ndarray) -> np.ndarray:
         total = np.zeros((len(scenes), *values.shape[1:]))
@@ -90,7 +89,7 @@ def choose_threshold(lines: Sequence[Line], rng: np.random.Generator) -> dict[st
     resampled = _youden(*(drawn @ c for c in counts), *((drawn @ s)[:, None] for s in sizes))
     low, high = np.percentile(THRESHOLDS[resampled.argmax(axis=1)], (2.5, 97.5))
 
-    graspable = sum(line["graspable"] for line in lines)
+    graspable = sum(trial.graspable for trial in trials)
     curve: list[dict[str, Any]] = []
     for k, threshold in enumerate(THRESHOLDS):
         hits, false = int((passes[:, k] & right).sum()), int((passes[:, k] & ~right).sum())

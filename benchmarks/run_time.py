@@ -1,4 +1,4 @@
-"""How long does a network take? Run time of each on each runtime, all of predict() and the network alone.
+"""Run time of each network on each runtime, of all of predict() and of the network alone.
 
     python benchmarks/run_time.py
 
@@ -20,15 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import study
-from mpgrasp.workspace import WORKSPACE_CENTRE
 from timed_network import WIDE, Entry, available_runtimes, make_entry, network_size, time_all, weights_for
 
-from mpgrasp.camera.wrist_camera import BACKENDS, WristCamera
+from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import CROP, DepthFrame
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.suite import episode_seed, load_suite
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

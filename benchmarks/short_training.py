@@ -38,7 +38,7 @@ class Variant:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What all networks of a study share."""
+    """Settings that all networks of a study share."""
 
     epochs: int = 10
     """The paper's."""

@@ -1,4 +1,4 @@
-"""What a 10 Hz control tick spends its time on, and how much memory a run takes.
+"""Time that the parts of a 10 Hz control tick take, and the memory of a run.
 
     python benchmarks/stages.py --ticks 100
 
@@ -28,7 +28,7 @@ BUDGET_MS = 25.0
 """For a whole tick without the detector, on 2 cores [ms]."""
 BUDGET_MB = 2000.0
 """For the whole process, networks included [MB]."""
-STAGES = ("render", "noise", "grid map", "utility", "ik", "physics", "reflex")
+PARTS = ("render", "noise", "grid map", "utility", "ik", "physics", "reflex")
 """The last one is all else that the velocity loop does: ramps, protective stops, statistics."""
 NETWORK_IMAGES = 30
 """Images that each network is timed on, after a few to warm up."""
@@ -60,7 +60,7 @@ class Stopwatch:
 
     def next_tick(self) -> None:
         """Close this tick."""
-        for name in STAGES:
+        for name in PARTS:
             self.ticks[name].append(self._tick.pop(name, 0.0))
         self._tick.clear()
 
@@ -151,13 +151,14 @@ def time_network(name: str, frames: list[Any]) -> float | None:
 
 def main() -> int:
     """Print the table; exit code 1 where a tick without detector, or memory, is over budget."""
+    from mpgrasp.camera.backends import BACKENDS
     from mpgrasp.detectors import DETECTORS
 
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--ticks", type=int, default=100, help="ticks to time (default: 100)")
-    parser.add_argument("--camera", choices=("auto", "gl", "ray"), default="auto")
+    parser.add_argument("--camera", choices=BACKENDS, default="auto")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     if arguments.ticks < 1 or arguments.seed < 0:
@@ -165,15 +166,15 @@ def main() -> int:
 
     watch, frames, backend = play(arguments.ticks, arguments.camera, arguments.seed)
     memory_without_networks = _peak_memory()
-    median = {name: 1e3 * float(np.median(watch.ticks[name])) for name in STAGES}
-    totals = 1e3 * np.sum([watch.ticks[name] for name in STAGES], axis=0)
+    median = {name: 1e3 * float(np.median(watch.ticks[name])) for name in PARTS}
+    totals = 1e3 * np.sum([watch.ticks[name] for name in PARTS], axis=0)
     whole = float(np.median(totals))
 
     table = Table(title=f"One control tick, camera: {backend}, {os.cpu_count()} cores, {len(totals)} ticks")
     table.add_column("stage")
     for heading in ("median ms", "share"):
         table.add_column(heading, justify="right")
-    for name in STAGES:
+    for name in PARTS:
         table.add_row(name, f"{median[name]:.2f}", f"{100 * median[name] / sum(median.values()):.0f} %")
     table.add_section()
     late = float(np.percentile(totals, 95))

@@ -1,4 +1,4 @@
-"""What the studies share: command lines, rates, paired tests, results on disk and the look of figures.
+"""Shared parts of the studies: command lines, rates, paired tests, results on disk and the look of figures.
 
 Every study leaves `run.json` (command, settings, versions, weights), `<study>.json` (results), `<study>.csv`
 (the same as a table) and `<study>.png` in its folder.
@@ -23,7 +23,7 @@ from mpgrasp.bench.results.provenance import provenance, sha256
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replace_file
-from mpgrasp.files.json_values import plain
+from mpgrasp.files.json_values import json_value
 from mpgrasp.paths import WEIGHTS
 from mpgrasp.plugins import load_detector
 from mpgrasp.statistics import holm, mcnemar, wilson_interval
@@ -107,7 +107,7 @@ def kept(path: Path, settings: Mapping[str, Any], make: Callable[[], dict[str, A
         ConfigError: the file holds a result of other settings.
         OutputError: the file cannot be written or read.
     """
-    wanted = json.loads(json.dumps(plain(settings)))
+    wanted = json.loads(json.dumps(json_value(settings)))
     try:
         if path.is_file():
             there = json.loads(path.read_text("utf-8"))
@@ -119,7 +119,7 @@ def kept(path: Path, settings: Mapping[str, Any], make: Callable[[], dict[str, A
         path.parent.mkdir(parents=True, exist_ok=True)
     except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
         raise OutputError(f"result cannot be kept: {error!r}", got=str(path)) from error
-    result: dict[str, Any] = json.loads(json.dumps(plain(make())))
+    result: dict[str, Any] = json.loads(json.dumps(json_value(make())))
     _write(path, json.dumps({"settings": wanted, "result": result}) + "\n")
     return result
 
@@ -209,8 +209,8 @@ def publish(
         OutputError: the folder or a file cannot be written.
     """
     prepare(out)
-    _write(out / "run.json", json.dumps(plain(run), indent=1) + "\n")
-    _write(out / f"{name}.json", json.dumps(plain(results), indent=1) + "\n")
+    _write(out / "run.json", json.dumps(json_value(run), indent=1) + "\n")
+    _write(out / f"{name}.json", json.dumps(json_value(results), indent=1) + "\n")
     flat = [_flat(row) for row in rows]
     try:
         with (out / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:

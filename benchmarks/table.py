@@ -7,10 +7,11 @@ into docs/results.md. A test holds that documents and summaries say the same.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
+from mpgrasp.bench.analysis.summary import CellSummary
+from mpgrasp.bench.record import Cell
+from mpgrasp.bench.results.reader import read_summary
 from mpgrasp.exceptions import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -25,27 +26,27 @@ DETECTORS = ("oracle", "dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
 NOT_PLAYED = ""
 
 
-def cells() -> list[dict[str, Any]]:
+def cells() -> dict[Cell, CellSummary]:
     """All published cells, as in the summaries.
 
     Raises:
         ConfigError: two runs have played the same cell.
+        OutputError: a summary that cannot be used.
     """
-    found: list[dict[str, Any]] = []
-    source: dict[tuple[str, str, str], Path] = {}
-    for path in sorted(RESULTS.glob("*/summary.json")):
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        assert summary["complete"], f"{path} is the summary of an unfinished run"
-        for cell in summary["cells"]:
-            key = cell["suite"], cell["detector"], cell["controller"]
-            if key in source:
+    found: dict[Cell, CellSummary] = {}
+    source: dict[Cell, Path] = {}
+    for folder in sorted(path.parent for path in RESULTS.glob("*/summary.json")):
+        summary = read_summary(folder)
+        assert summary is not None
+        assert summary.complete, f"{folder} holds an unfinished run"
+        for row in summary.cells:
+            if row.cell in source:
                 raise ConfigError(
-                    f"two runs have played {'/'.join(key)}",
-                    got=[file.parent.name for file in (source[key], path)],
+                    f"two runs have played {row.cell}",
+                    got=[source[row.cell].name, folder.name],
                     allowed="each cell in one published run",
                 )
-            source[key] = path
-            found.append(cell)
+            source[row.cell], found[row.cell] = folder, row
     return found
 
 
@@ -54,27 +55,23 @@ def table(*, paper: bool) -> str:
 
     It has a row per detector and controller and a column per suite, two where tables are cleared.
     """
-    by_key = {
-        (c["detector"], c["controller"], c["suite"]): c for c in cells() if (c["suite"] in PAPER) is paper
-    }
-    suites = sorted({suite for *_, suite in by_key}, key=lambda name: (_rank(name, PAPER), name))
-    methods = sorted({key[:2] for key in by_key}, key=lambda m: (_rank(m[0], DETECTORS), *m))
-    clearing = {
-        suite for *_, suite in by_key if any(c["clearing"] for k, c in by_key.items() if k[2] == suite)
-    }
+    rows = {cell: row for cell, row in cells().items() if (cell.suite in PAPER) is paper}
+    suites = sorted({cell.suite for cell in rows}, key=lambda name: (_rank(name, PAPER), name))
+    methods = sorted({cell.method for cell in rows}, key=lambda m: (_rank(m.detector, DETECTORS), *m))
+    clearing = {cell.suite for cell, row in rows.items() if row.clearing}
     head = ["detector", "controller"]
     for suite in suites:
-        sizes = {c["n"] for key, c in by_key.items() if key[2] == suite}
+        sizes = {row.n for cell, row in rows.items() if cell.suite == suite}
         assert len(sizes) == 1, f"cells of {suite} have different numbers of episodes: {sizes}"
         what = " cleared" if suite in clearing else ""
         head += [f"{suite}{what} %, n = {sizes.pop()}"] + [f"{suite}, time [s]"] * bool(what)
     lines = [_line(*head), "|" + "---|" * len(head)]
     for method in methods:
-        row = list(method)
+        texts = list(method)
         for suite in suites:
-            cell = by_key.get((*method, suite))
-            row += [_rate(cell)] + [_time(cell)] * (suite in clearing)
-        lines.append(_line(*row))
+            found = rows.get(Cell(suite, *method))
+            texts += [_rate(found)] + [_time(found)] * (suite in clearing)
+        lines.append(_line(*texts))
     return "\n".join(lines)
 
 
@@ -82,17 +79,16 @@ def _rank(name: str, order: tuple[str, ...]) -> int:
     return order.index(name) if name in order else len(order)
 
 
-def _rate(cell: dict[str, Any] | None) -> str:
-    if cell is None:
+def _rate(row: CellSummary | None) -> str:
+    if row is None or row.rate is None:
         return NOT_PLAYED
-    low, high = (100 * cell[f"wilson_{end}"] for end in ("low", "high"))
-    return f"{100 * cell['rate']:.0f} ({low:.0f}-{high:.0f})"
+    return f"{100 * row.rate:.0f} ({100 * row.wilson_low:.0f}-{100 * row.wilson_high:.0f})"
 
 
-def _time(cell: dict[str, Any] | None) -> str:
-    if cell is None:
+def _time(row: CellSummary | None) -> str:
+    if row is None or row.mean_time_s is None:
         return NOT_PLAYED
-    return f"{cell['mean_time_s']:.0f} ({cell['mean_time_low']:.0f}-{cell['mean_time_high']:.0f})"
+    return f"{row.mean_time_s:.0f} ({row.mean_time_low:.0f}-{row.mean_time_high:.0f})"
 
 
 def _line(*values: object) -> str:

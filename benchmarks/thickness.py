@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from mpgrasp.scene.config import SceneConfig
 from study import (
     RESULTS,
     Parser,
@@ -37,13 +36,15 @@ from study import (
     track,
 )
 
-from mpgrasp.camera.wrist_camera import BACKENDS, WristCamera
+from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.controllers.config import MppcConfig
 from mpgrasp.depth import CROP
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, line_angle_difference, looking_down
 from mpgrasp.grasp import GraspMap, best_pixel, peak_height
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import ObjectModel, Part
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.suite import episode_seed
@@ -53,7 +54,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Detectors = Mapping[str, GraspDetector]
-Verdict = tuple[str, float, float, str]
+Sighting = tuple[str, float, float, str]
+"""Detector, thickness [mm], height [m], and what was seen: detected, false_peak, no_peak or right."""
 OUT = RESULTS / "thickness"
 THICKNESSES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)  # [mm]
 HEIGHTS = (0.175, 0.25, 0.35, 0.50)  # of the tool point over the table [m]
@@ -68,7 +70,7 @@ _PARKED = 20.0  # [m], height at which no downward camera sees the stick
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """What is looked at."""
+    """Sticks, heights and scenes of the study."""
 
     thicknesses: tuple[float, ...] = THICKNESSES
     heights: tuple[float, ...] = HEIGHTS
@@ -88,7 +90,7 @@ class Study:
 
 def run(study: Study, detectors: Detectors) -> list[dict[str, Any]]:
     """A cell per detector, thickness (0: no stick) and height, in that order: counts, rates, intervals."""
-    counts: Counter[Verdict] = Counter()
+    counts: Counter[Sighting] = Counter()
     for k in track(range(study.scenes), "scenes", study.scenes):
         for thickness in study.thicknesses:
             bare = thickness == study.thicknesses[0]  # without a stick all thicknesses look alike
@@ -102,8 +104,8 @@ def run(study: Study, detectors: Detectors) -> list[dict[str, Any]]:
     return cells
 
 
-def _look(study: Study, k: int, thickness: float, detectors: Detectors, bare: bool) -> list[Verdict]:
-    """Verdicts on scene k with a stick of that thickness [mm] and, if `bare`, without it as well."""
+def _look(study: Study, k: int, thickness: float, detectors: Detectors, bare: bool) -> list[Sighting]:
+    """Sightings in scene k with a stick of that thickness [mm] and, if `bare`, without it as well."""
     seed, threshold = study.scene_seed(k), MppcConfig().peak_threshold
     box = Part(shape="box", size=(LENGTH / 2, WIDTH / 2, thickness / 2000))
     stick = ObjectModel(name="stick", parts=(box,), mass=DENSITY * box.volume)
@@ -132,15 +134,15 @@ def _look(study: Study, k: int, thickness: float, detectors: Detectors, bare: bo
                 grasp_map = detector.predict(frame)
                 right = not empty and is_right(grasp_map, pose)
                 peak = "detected" if right else "false_peak"
-                verdict = peak if peak_height(grasp_map.quality) > threshold else "no_peak"
+                seen = peak if peak_height(grasp_map.quality) > threshold else "no_peak"
                 of = name, 0.0 if empty else thickness, height
-                found += [(*of, verdict)] + [(*of, "right")] * right
+                found += [(*of, seen)] + [(*of, "right")] * right
     camera.close()
     return found
 
 
 def is_right(grasp_map: GraspMap, pose: FloatArray) -> bool:
-    """Whether the best pixel's grasp holds the stick; pose (4, 3) is its rotation and, below, position."""
+    """True if the best pixel's grasp holds the stick; pose (4, 3) is its rotation and, below, position."""
     grasp = grasp_map.grasp_at(*best_pixel(grasp_map.quality))
     along = pose[:2, 0] / np.linalg.norm(pose[:2, 0])  # the long axis is x, seen from above
     offset = grasp.position[:2] - pose[3, :2]

@@ -52,7 +52,7 @@ class Entry:
     detector: NetworkDetector
     timed: Timed
     first_call: dict[str, float | None]
-    """Of cold and cached: building the runtime and running it once [s]."""
+    """Time to build the runtime and run it once, with an empty cache (cold) and a filled one (cached) [s]."""
     predict: list[float] = field(default_factory=list)
     """All of predict() [s]."""
     alone: list[float] = field(default_factory=list)

@@ -13,9 +13,7 @@ import pytest
 def fake_world(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Episodes and world card that take no time."""
     monkeypatch.setattr("mpgrasp.episode.episode.run_episode", fakes.run_episode)
-    monkeypatch.setattr(
-        "mpgrasp.bench.playing.world_card.world_card", lambda *_: {"physics": {}, "camera": {}}
-    )
+    monkeypatch.setattr("mpgrasp.bench.playing.world_card.world_card", lambda *_: fakes.WORLD)
     return monkeypatch
 
 

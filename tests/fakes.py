@@ -12,6 +12,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from mpgrasp.bench.results.run_card import WorldCard
+
 
 class FakeDetector:
     name = "fake"
@@ -54,23 +56,31 @@ class FailsToStart:
         raise RuntimeError("no licence")
 
 
+WORLD = WorldCard(physics={}, camera={}, motion={}, ik={}, reflex={})
+"""World card of episodes that are not played."""
+
+
 @dataclass
 class FakeResult:
     seed: int
     scene: Any
 
     def as_record(self) -> dict[str, Any]:
-        success = self.seed % 3 != 0
+        success, item = self.seed % 3 != 0, self.scene.objects[0]
         return {
-            "object": self.scene.objects[0],
+            "object": getattr(item, "name", item),
             "outcome": "success" if success else "missed",
             "success": success,
-            "sim_time_s": 5.0 + self.seed % 1000 / 700,
+            "sim_time_s": round(5.0 + self.seed % 1000 / 700, 6),
             "ticks": 50,
             "reflex": None,
             "min_singular_value": 0.1,
-            "path_length_m": 1 / 3,
+            "near_singularity_s": 0.0,
+            "path_length_m": 0.333333333,
             "jerk_rms": 2.0,
+            "spectral_arc_length": -1.5,
+            "first_detection_s": None,
+            "blind_drift_m": 0.01,
             "grasp": None,
             "timing": {"detect": time.perf_counter()},
             "state_hash": f"{self.seed:08x}",

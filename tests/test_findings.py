@@ -18,9 +18,12 @@ import published_runs
 import published_studies
 import pytest
 import table
+from bench_runs import grasp_row
 
 from mpgrasp.bench.analysis.hypotheses import Verdict, count_verdicts, evaluate
-from mpgrasp.bench.record import by_cell
+from mpgrasp.bench.analysis.summary import RunSummary, summarise
+from mpgrasp.bench.record import by_cell, line_of
+from mpgrasp.bench.results.reader import read_lines
 from mpgrasp.exceptions import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -192,18 +195,26 @@ def test_a_cell_that_two_published_runs_have_played_is_refused(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(table, "RESULTS", tmp_path)
-    cell = {"suite": "thin", "detector": "oracle", "controller": "mppc", "n": 1}
-    for run, found in (("a", [cell]), ("b", [{**cell, "controller": "mvp"}])):
-        (tmp_path / run).mkdir()
-        (tmp_path / run / "summary.json").write_text(json.dumps({"complete": True, "cells": found}))
+
+    def publish(run: str, *controllers: str) -> None:
+        rows = [
+            grasp_row(suite="thin", detector="oracle", controller=controller) for controller in controllers
+        ]
+        summary = RunSummary(complete=True, cells=tuple(summarise(map(line_of, rows))), paired_tests=())
+        (tmp_path / run).mkdir(exist_ok=True)
+        (tmp_path / run / "summary.json").write_text(json.dumps(summary.as_row()))
+
+    publish("a", "mppc")
+    publish("b", "mvp")
     assert len(table.cells()) == 2
-    (tmp_path / "b" / "summary.json").write_text(json.dumps({"complete": True, "cells": [{**cell, "n": 2}]}))
+    publish("b", "mppc")
     with pytest.raises(ConfigError, match=r"two runs have played thin/oracle/mppc; got \['a', 'b'\]"):
         table.table(paper=True)
 
 
 def test_the_report_on_the_paper_says_what_follows_from_the_episodes() -> None:
-    lines = [line for run in ("single", "unseen-thin", "stacked") for line in published_runs.episodes(run)]
+    runs = ("single", "unseen-thin", "stacked")
+    lines = [line for run in runs for line in read_lines(published_runs.RESULTS / run).lines]
     findings = evaluate(by_cell(lines))
     assert len(findings) == len(published_runs.orderings())
     for verdict, n in count_verdicts(findings).items():

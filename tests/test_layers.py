@@ -190,8 +190,8 @@ def loaded(code: str, *arguments: str) -> list[str]:
     "module",
     ["mpgrasp", "mpgrasp.detectors", "mpgrasp.controllers", "mpgrasp.controllers.mppc", "mpgrasp.scene",
      "mpgrasp.scene.config", "mpgrasp.scene.objects.from_mesh", "mpgrasp.camera", "mpgrasp.camera.backends",
-     "mpgrasp.robot.hand", "mpgrasp.motion", "mpgrasp.episode", "mpgrasp.suite", "mpgrasp.plugins",
-     "mpgrasp.bench"],
+     "mpgrasp.robot.hand", "mpgrasp.motion", "mpgrasp.episode", "mpgrasp.episode.config",
+     "mpgrasp.episode.result", "mpgrasp.episode.stages", "mpgrasp.suite", "mpgrasp.plugins", "mpgrasp.bench"],
 )  # fmt: skip
 def test_importing_a_room_loads_nothing_heavy(module: str) -> None:
     assert loaded(f"import {module}") == []
@@ -203,9 +203,9 @@ def test_importing_the_environment_loads_no_torch() -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "report", "--help"),
-     ("detectors", "--help"), ("scene", "--help"), ("training", "--help"),
-     ("training", "generate", "--help"), ("training", "train", "--help")],
+    [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "replay", "--help"),
+     ("bench", "report", "--help"), ("detectors", "--help"), ("scene", "--help"),
+     ("training", "--help"), ("training", "generate", "--help"), ("training", "train", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
     module = f"mpgrasp.{words[0]}"

@@ -33,7 +33,9 @@ def test_a_wheel_carries_all_that_the_checkout_offers(tmp_path: Path) -> None:
         archive.extractall(tmp_path / "site")
     files = {f"mpgrasp/_data/benchmarks/{file.name}" for file in (REPOSITORY / "benchmarks").glob("*.toml")}
     files |= {"mpgrasp/_data/scenes/table.xml", "mpgrasp/_data/assets/objects/objects.toml"}
-    assert files <= names
+    package = (file for file in (REPOSITORY / "mpgrasp").rglob("*") if "__pycache__" not in file.parts)
+    files |= {str(file.relative_to(REPOSITORY)) for file in package if file.is_file()}
+    assert {"mpgrasp/py.typed", "mpgrasp/__init__.pyi"} <= files <= names
     assert not any("__pycache__" in name or name.startswith("tests/") for name in names)
     # the unpacked wheel finds its own data, far from the checkout
     listed = subprocess.run(

@@ -1,20 +1,28 @@
-"""The words that all of the benchmark shares: cell, task, line."""
+"""Rows of result files, with the lines of episodes.jsonl, and the words Method, Cell and Task.
+
+A row is read and written here and nowhere else. Its keys are those of the file; an unknown key, a missing
+one or a value of another type is an error. benchmarks/README.md explains them to users.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
-Line = dict[str, Any]
-"""One line of episodes.jsonl."""
+import msgspec
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.files.json_values import json_value, one_line
+from mpgrasp.outcome import Outcome
+
+ERROR: Final = "error"
+"""`outcome` of an episode that could not be played: it is no failure of a grasp, and is counted apart."""
+
+Row = TypeVar("Row", bound="Record")
 
 
-ERROR = "error"
-"""`outcome` of an episode that could not be played: no failure of a grasp, and counted apart."""
-
-
-class Cell(NamedTuple):
+class Method(NamedTuple):
     """A detector and a controller that play together."""
 
     detector: str
@@ -22,19 +30,38 @@ class Cell(NamedTuple):
     controller: str
     """Registry name or import path."""
 
+    def __str__(self) -> str:
+        return f"{self.detector}/{self.controller}"
+
+
+class Cell(NamedTuple):
+    """A method in a suite: one row of a table of results."""
+
+    suite: str
+    detector: str
+    controller: str
+
+    @property
+    def method(self) -> Method:
+        """Detector and controller of the cell."""
+        return Method(self.detector, self.controller)
+
+    def __str__(self) -> str:
+        return f"{self.suite}/{self.detector}/{self.controller}"
+
 
 class Task(NamedTuple):
-    """One episode of one cell: what tells one line of a run from all others."""
+    """One episode of one cell; no two lines of a run have the same task."""
 
     suite: str
     episode: int
     detector: str
     controller: str
 
-    @classmethod
-    def of(cls, line: Mapping[str, Any]) -> Task:
-        """The task that a line of episodes.jsonl is about."""
-        return cls(*(line[name] for name in cls._fields))
+    @property
+    def cell(self) -> Cell:
+        """The cell that the episode belongs to."""
+        return Cell(self.suite, self.detector, self.controller)
 
     @property
     def stem(self) -> str:
@@ -46,12 +73,174 @@ class Task(NamedTuple):
         return f"episode {self.episode} of {self.suite} ({self.detector}, {self.controller})"
 
 
-Cells = dict[tuple[str, str, str], list[Mapping[str, Any]]]
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A row of a result file, or a part of one."""
+
+    def as_row(self) -> dict[str, Any]:
+        """Plain values by key, as they stand in the file: floats have 9 digits, and NaN is None."""
+        row: dict[str, Any] = json_value(msgspec.to_builtins(self))
+        return row
 
 
-def by_cell(episodes: Iterable[Mapping[str, Any]]) -> Cells:
-    """Lines by (suite, detector, controller), in order of first appearance."""
+class Stop(Record, frozen=True, kw_only=True):
+    """A protective stop: `mpgrasp.motion.reflex.Reflex` in plain values."""
+
+    limit: str
+    """Name of the limit that was broken."""
+    joint: int | None
+    """Number of the arm's joint, from 1; None where the limit is not one of a joint."""
+    value: float | None
+    bound: float | None
+    time: float
+    """Simulated time since the scene began [s]."""
+    demanded: bool
+    text: str
+    """The same in a sentence."""
+
+
+class ExecutedGrasp(Record, frozen=True, kw_only=True):
+    """The grasp that was executed: `mpgrasp.grasp.Grasp` in plain values."""
+
+    position: tuple[float, float, float]
+    """World [m]."""
+    angle: float
+    """[rad]"""
+    width: float
+    """[m]"""
+    quality: float | None
+
+
+class Reach(Record, frozen=True, kw_only=True):
+    """Measurements of one attempt, or of an episode as a whole; None where a value was not measured."""
+
+    outcome: Outcome
+    success: bool
+    object: str
+    sim_time_s: float
+    ticks: int
+    reflex: Stop | None
+    """The first protective stop."""
+    min_singular_value: float | None
+    near_singularity_s: float | None
+    path_length_m: float | None
+    jerk_rms: float | None
+    spectral_arc_length: float | None
+    first_detection_s: float | None
+    blind_drift_m: float | None
+    grasp: ExecutedGrasp | None
+
+
+class Pick(Reach, frozen=True, kw_only=True):
+    """One attempt of a clearing."""
+
+    start_s: float
+    end_s: float
+
+
+class GraspLine(Reach, frozen=True, kw_only=True):
+    """Line of an episode with one grasp."""
+
+    suite: str
+    seed: int
+    scene_seed: int
+    episode: int
+    detector: str
+    controller: str
+    timing: dict[str, float | None]
+    """Median wall time of each stage of a control tick [ms]."""
+    state_hash: str
+
+    @property
+    def task(self) -> Task:
+        """Episode that the line is about."""
+        return Task(self.suite, self.episode, self.detector, self.controller)
+
+    @property
+    def all_stops(self) -> tuple[Stop, ...]:
+        """All protective stops, in their order."""
+        return () if self.reflex is None else (self.reflex,)
+
+
+class ClearingLine(GraspLine, frozen=True, kw_only=True):
+    """Line of an episode in which a table was to be cleared."""
+
+    failures: dict[str, int]
+    """Attempts that put nothing into the basket, by outcome."""
+    in_basket: tuple[str, ...]
+    knocked_off: tuple[str, ...]
+    left: tuple[str, ...]
+    stops: tuple[Stop, ...]
+    time_limit_s: float
+    picks: tuple[Pick, ...]
+
+    @property
+    def all_stops(self) -> tuple[Stop, ...]:
+        return self.stops
+
+
+class ErrorLine(Record, frozen=True, kw_only=True):
+    """Line of an episode that could not be played."""
+
+    suite: str
+    seed: int
+    scene_seed: int
+    episode: int
+    detector: str
+    controller: str
+    outcome: Literal["error"] = ERROR
+    success: None = None
+    error: str
+    """Cause, in a sentence."""
+    traceback: str
+    """Tracebacks of all attempts; in episodes.jsonl, the name of the file that holds them."""
+
+    @property
+    def task(self) -> Task:
+        """Episode that the line is about."""
+        return Task(self.suite, self.episode, self.detector, self.controller)
+
+
+PlayedLine = GraspLine | ClearingLine
+Line = PlayedLine | ErrorLine
+Cells = dict[Cell, list[Line]]
+
+
+def line_of(row: Mapping[str, Any]) -> Line:
+    """The line that plain values describe.
+
+    Raises:
+        ConfigError: an unknown or a missing key, or a value of another type; it names the key.
+    """
+    if row.get("outcome") == ERROR:
+        return record_of(ErrorLine, row)
+    return record_of(ClearingLine if "picks" in row else GraspLine, row)
+
+
+def record_of(kind: type[Row], row: Mapping[str, Any]) -> Row:
+    """A row of that kind from plain values.
+
+    Raises:
+        ConfigError: an unknown or a missing key, or a value of another type; it names the key.
+    """
+    try:
+        return msgspec.convert(row, kind)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"cannot be used: {error}") from error
+
+
+def text_of(line: Line) -> str:
+    """The line as it stands in episodes.jsonl: sorted keys, line end; equal lines, equal bytes."""
+    return one_line(line.as_row())
+
+
+def played(lines: Iterable[Line]) -> list[PlayedLine]:
+    """Lines of episodes that were played, be it without success."""
+    return [line for line in lines if not isinstance(line, ErrorLine)]
+
+
+def by_cell(lines: Iterable[Line]) -> Cells:
+    """Lines by cell, in order of first appearance."""
     cells: Cells = {}
-    for line in episodes:
-        cells.setdefault((line["suite"], line["detector"], line["controller"]), []).append(line)
+    for line in lines:
+        cells.setdefault(line.task.cell, []).append(line)
     return cells

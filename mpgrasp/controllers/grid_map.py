@@ -67,7 +67,7 @@ class GridConfig:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns (ny, nx)."""
+        """(ny, nx) cells."""
         n = max(1, round(self.extent / self.cell))
         return n, n
 
@@ -88,7 +88,7 @@ class GridMap:
         self.counts: NDArray[np.float32] = np.zeros((ny, nx, c.n_angle, c.n_quality), np.float32)
         """m of the paper: observations per angle and quality bin, without prior."""
         self.failures: NDArray[np.float32] = np.zeros((ny, nx), np.float32)
-        """Amount (ny, nx) by which quality is lowered after failed grasps."""
+        """By how much quality is lowered after failed grasps."""
         self._weight = np.zeros(ny * nx)
         self._weighted_width = np.zeros(ny * nx)
         self._weighted_height = np.zeros(ny * nx)
@@ -101,7 +101,7 @@ class GridMap:
 
     @property
     def quality_centres(self) -> FloatArray:
-        """Worth (n_q,) of an observation in each bin: the bin's centre.
+        """(n_q,) what an observation in each bin is worth: the bin's centre.
 
         Eq. 7 writes n_q / N_q, the upper edge, which overrates everything by half a bin.
         """
@@ -109,17 +109,17 @@ class GridMap:
 
     @property
     def angle_centres(self) -> FloatArray:
-        """Centre (n_theta,) of each angle bin [rad]."""
+        """(n_theta,) centre of each angle bin [rad]."""
         return (np.arange(self.config.n_angle) + 0.5) / self.config.n_angle * np.pi - np.pi / 2
 
     def axes(self) -> tuple[FloatArray, FloatArray]:
-        """Return world x (nx,) and y (ny,) of the cell centres [m]."""
+        """World x (nx,) and y (ny,) of the cell centres [m]."""
         ny, nx = self.shape
         u = self.config.cell
         return self.x0 + (np.arange(nx) + 0.5) * u, self.y0 + (np.arange(ny) + 0.5) * u
 
     def position(self, cell: tuple[int, int]) -> FloatArray:
-        """Return world (x, y) of a cell's centre [m]."""
+        """World (x, y) of a cell's centre [m]."""
         u = self.config.cell
         return np.array([self.x0 + (cell[1] + 0.5) * u, self.y0 + (cell[0] + 0.5) * u])
 
@@ -151,7 +151,7 @@ class GridMap:
         return cells
 
     def _locate(self, grasp_map: GraspMap) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-        """Return the flat cell index (H, W), -1 where the point is dropped, and world z (H, W) [m]."""
+        """Flat cell index (H, W), -1 where the point is dropped, and world z (H, W) [m]."""
         c, k = self.config, grasp_map.intrinsics
         ny, nx = self.shape
         R, t = grasp_map.T_world_camera[:3, :3], grasp_map.T_world_camera[:3, 3]
@@ -173,11 +173,11 @@ class GridMap:
         return cells, z
 
     def observations(self) -> FloatArray:
-        """Return the number (ny, nx) of points seen in each cell."""
+        """(ny, nx) points seen in each cell."""
         return self._summary()[0]
 
     def mean_quality(self) -> FloatArray:
-        """Return the mean quality (ny, nx), eq. 7, less what failures took; 0 where unseen."""
+        """Mean quality (ny, nx) of the observations, eq. 7, less what failures took; 0 where unseen."""
         return self._summary()[1]
 
     def _summary(self) -> tuple[FloatArray, FloatArray]:
@@ -189,7 +189,7 @@ class GridMap:
         return self._fresh
 
     def mean_angle(self, cell: tuple[int, int]) -> float:
-        """Return the mean closing direction of a cell [rad], eq. 8, weighted by quality.
+        """Mean closing direction of a cell [rad], eq. 8, weighted by quality.
 
         Angles are doubled before averaging (a grasp is the same after half a turn); eq. 8 as printed
         would make 0 out of -89 and +89 degrees.
@@ -199,11 +199,11 @@ class GridMap:
         return float(wrap_half_pi(np.arctan2(s, c) / 2))
 
     def mean_width(self, cell: tuple[int, int]) -> float:
-        """Return the mean opening of a cell [m], eq. 9, weighted by quality; 0 where no grasp was seen."""
+        """Mean opening of a cell [m], eq. 9, weighted by quality; 0 where no grasp was ever seen."""
         return self._weighted_mean(self._weighted_width, cell)
 
     def mean_height(self, cell: tuple[int, int]) -> float:
-        """Return the mean surface height of a cell [m], weighted by quality; 0 where no grasp was seen."""
+        """Mean surface height of a cell [m], weighted by quality; 0 where no grasp was ever seen."""
         return self._weighted_mean(self._weighted_height, cell)
 
     def _weighted_mean(self, total: FloatArray, cell: tuple[int, int]) -> float:
@@ -211,7 +211,7 @@ class GridMap:
         return float(total[flat] / self._weight[flat]) if self._weight[flat] > 0 else 0.0
 
     def best_cell(self) -> tuple[int, int] | None:
-        """Return the cell of the highest mean quality among those seen often (see `GridConfig.evidence`).
+        """The cell of the highest mean quality among those seen often enough (see `GridConfig.evidence`).
 
         None where every observation fell into the lowest quality bin: such a map says nothing.
         """
@@ -222,7 +222,7 @@ class GridMap:
         return (int(best[0]), int(best[1])) if rank[best] > 0 else None
 
     def grasp(self, cell: tuple[int, int]) -> Grasp:
-        """Return the grasp of a cell, eq. 6: at its centre, on its mean surface, of mean angle and width."""
+        """The grasp of a cell, eq. 6: at its centre, on its mean surface, with its mean angle and width."""
         return Grasp(
             position=np.array([*self.position(cell), self.mean_height(cell)]),
             angle=self.mean_angle(cell),
@@ -231,7 +231,7 @@ class GridMap:
         )
 
     def best_grasp(self) -> Grasp | None:
-        """Return the grasp of the best cell, or None where no grasp was seen."""
+        """The grasp of the best cell, or None where no grasp was seen."""
         cell = self.best_cell()
         return None if cell is None else self.grasp(cell)
 

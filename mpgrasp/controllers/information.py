@@ -16,7 +16,7 @@ as in published multi-view picking code, which takes away the pull towards the m
 
 
 def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
-    """Return the entropy (...) [nat] of quality histograms (..., n_q), eq. 10; `prior` is added to all bins.
+    """Entropy (...) [nat] of quality histograms (..., n_q), eq. 10; `prior` is added to every bin.
 
     An empty histogram is maximally uncertain, log n_q: the limit of a vanishing uniform prior, where
     eq. 10 is 0/0.
@@ -34,15 +34,14 @@ def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
 
 
 def grid_entropy(grid: GridMap, prior_count: float = 1.0) -> FloatArray:
-    """Return the entropy (ny, nx) [nat] of every cell; log N_q, the maximum, where nothing was seen.
-
-    `prior_count` is counted per angle and quality bin, hence N_theta times per quality bin.
+    """Entropy (ny, nx) [nat] of every cell with `prior_count` per angle and quality bin, hence N_theta of
+    it per quality bin; log N_q, the maximum, where nothing was seen.
     """
     return cell_entropy(grid.quality_counts, prior_count * grid.config.n_angle)
 
 
 def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothing") -> FloatArray:
-    """Return the expected gain (ny, nx) [nat] of a view from above each cell, eq. 11.
+    """Expected gain (ny, nx) [nat] of a view from above each cell, eq. 11.
 
     The weights P are a Gaussian of `sigma` cells, cut at 3 sigma, that sums to one: the gain is the mean
     entropy under the footprint, whatever its size, so that the exploration cost weighs the same at every
@@ -63,7 +62,7 @@ def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothin
 
 
 def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: float) -> FloatArray:
-    """Return the cost r (ny, nx) [m] of a viewpoint above each cell, eq. 13.
+    """Cost r (ny, nx) [m] of a viewpoint above each cell, eq. 13.
 
     The distance to the best cell at world (x, y) `centre`, times one minus the height fraction
     (t_z - z_min) / (z_max - z_min). Zero where there is no best cell yet.
@@ -77,5 +76,5 @@ def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: 
 
 
 def utility(gain: FloatArray, cost: FloatArray, gamma: float) -> FloatArray:
-    """Return the utility (ny, nx) [nat] of every viewpoint, eq. 12, with `gamma` in nat per metre."""
+    """Utility (ny, nx) [nat] of every viewpoint, eq. 12, with `gamma` in nat per metre."""
     return np.asarray(gain, np.float32) - gamma * cost

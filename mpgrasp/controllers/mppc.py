@@ -24,7 +24,7 @@ class Mppc(ReachingController):
         self.pool: list[Grasp] = []
 
     def final_grasp(self) -> Grasp | None:
-        """Return the best grasp of the pool (line 17); of equals the latest, which was seen from nearest."""
+        """Line 17: the best grasp of the pool; of equals the latest, which was seen from nearest by."""
         best = max(reversed(self.pool), key=lambda grasp: grasp.quality, default=None)
         return best if best is not None and best.quality >= self.config.min_quality else None
 
@@ -38,7 +38,7 @@ class Mppc(ReachingController):
 
 
 def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:
-    """Return the grasp of the best pixel whose point lies in the workspace, or None (lines 11-14).
+    """Lines 11-14: the grasp of the best pixel whose point lies in the workspace; None where none does.
 
     `cells` (H, W) is what `GridMap.update` returned for this view. Quality is lowered around remembered
     failures.

@@ -19,12 +19,12 @@ class Mvp(ReachingController):
     name = "mvp"
 
     def final_grasp(self) -> Grasp | None:
-        """Return the grasp, eq. 6, of the cell with the highest mean quality."""
+        """Eq. 6 of the cell with the highest mean quality."""
         best = self.grid.best_grasp()
         return best if best is not None and best.quality >= self.config.min_quality else None
 
     def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
-        """Do nothing: all that MVP knows is in the grid."""
+        """All that MVP knows is in the grid."""
 
     def _attenuation(self, peak: bool) -> float:
         return 1.0

@@ -13,7 +13,7 @@ from mpgrasp.grasp import Grasp, peak_height
 
 
 class OpenLoop:
-    """A controller that is done after its first view and never moves the arm."""
+    """Is done after its first view and never moves the arm."""
 
     name = "open_loop"
 
@@ -45,7 +45,7 @@ class OpenLoop:
         return Command(twist=np.zeros(6), gripper=self.config.gripper_open, done=True)
 
     def final_grasp(self) -> Grasp | None:
-        """Return the best grasp of the one view."""
+        """The best grasp of the one view."""
         enough = self._grasp is not None and self._grasp.quality >= self.config.min_quality
         return self._grasp if enough else None
 

@@ -17,7 +17,7 @@ from mpgrasp.grasp import Grasp, GraspMap, peak_height
 _TIE = 1e-3
 """Utilities closer to the best than this fraction of the range in the window are equally good."""
 _TIE_NAT = 1e-6
-"""Utilities closer than this are equally good too: single precision tells no more apart [nat]."""
+"""And so are utilities closer than this: single precision makes no better difference [nat]."""
 _YAW_SLACK = np.deg2rad(15)
 """Angle beyond the yaw range at which a grasp makes the hand turn the other way to meet it [rad]."""
 
@@ -80,10 +80,10 @@ class ReachingController(ABC):
 
     @abstractmethod
     def _attenuation(self, peak: bool) -> float:
-        """Return the factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
+        """Factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
 
     def _evaluate(self, grasp_map: GraspMap, height: float) -> FloatArray:
-        """Return the utility (ny, nx) of every viewpoint at the present height, eq. 12."""
+        """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
         c, k = self.config, grasp_map.intrinsics
         # a sixth of the field of view where it meets the table, in cells; mean of both image sides
         footprint = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
@@ -102,7 +102,7 @@ class ReachingController(ABC):
         return result
 
     def _best_viewpoint(self, values: FloatArray, camera: FloatArray) -> FloatArray:
-        """Return world (x, y) of the best utility within the window around the camera's (x, y).
+        """World (x, y) of the best utility within the window around the camera's (x, y).
 
         Where several are equally good, the one farthest along the episode's random heading, so that the
         choice is a direction and not the order of the array. Off the grid, its nearest cell.
@@ -118,7 +118,7 @@ class ReachingController(ABC):
         return self.grid.position((int(row), int(col)))
 
     def _yaw_rate(self, angle: float, T_world_tcp: FloatArray) -> float:
-        """Return the yaw rate [rad/s] towards direction `angle`, by the smaller turn that stays in range."""
+        """Yaw rate [rad/s] towards closing direction `angle`, by the smaller turn that stays in range."""
         c = self.config
         closing = np.arctan2(T_world_tcp[1, 1], T_world_tcp[0, 1])
         yaw = float(wrap_pi(np.arctan2(T_world_tcp[1, 0], T_world_tcp[0, 0]) - c.home_yaw))

@@ -14,6 +14,7 @@ import numpy as np
 
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.episode.basket import DROPS, Basket
 from mpgrasp.episode.config import ClearingConfig
 from mpgrasp.episode.episode import Episode, reach
 from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
@@ -26,13 +27,10 @@ from mpgrasp.motion.trajectory import path_profile
 from mpgrasp.outcome import Outcome
 from mpgrasp.recording.recorder import Recorder
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.scene import Scene
 from mpgrasp.workspace import WORKSPACE_CENTRE, WORKSPACE_REACH
 
 FALLEN = -0.02
 """An object whose frame lies lower than this over the table has fallen off it [m]."""
-DROPS = ((-0.03, -0.05), (0.03, 0.05), (-0.03, 0.05), (0.03, -0.05), (0.0, 0.0))
-"""Places in the basket at which the hand opens, in turn: x, y from its centre [m]. A heap would overflow."""
 CONTACT = 12.0
 """Force at which the hand opens above the basket because it is on something [N]: more than things weigh."""
 GUIDED_RATE = 0.5
@@ -79,20 +77,6 @@ def require_basket(scene_config: SceneConfig) -> None:
     """Raise ConfigError unless there is a basket to carry things to."""
     if not scene_config.basket:
         raise ConfigError("nowhere to carry things to", got="basket = false", allowed="basket = true")
-
-
-class Basket:
-    """The drop basket of a scene: its place, and what lies in it."""
-
-    def __init__(self, scene: Scene) -> None:
-        floor = scene.model.geom("basket/floor")
-        self.centre: FloatArray = scene.model.body("basket/body").pos[:2] + floor.pos[:2]
-        """World x, y [m]."""
-        self._half: FloatArray = np.array(floor.size[:2])
-
-    def holds(self, position: FloatArray) -> bool:
-        """Return True if a world position (3,) [m] is in the basket or heaped upon what is."""
-        return bool(np.all(np.abs(position[:2] - self.centre) <= self._half) and position[2] > 0)
 
 
 class Clearing:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from mpgrasp.files.json_values import plain
+from mpgrasp.files.json_values import json_value
 from mpgrasp.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class EpisodeResult:
 
     def as_record(self) -> dict[str, Any]:
         """Return a JSON-ready dict with one key per field and `success`; floats have 9 digits."""
-        record: dict[str, Any] = plain(
+        record: dict[str, Any] = json_value(
             {
                 **{name: getattr(self, name) for name in self.__dataclass_fields__},
                 "outcome": self.outcome.value,
@@ -91,7 +91,7 @@ class Pick:
         record = self.result.as_record()
         for key in ("timing", "state_hash"):
             del record[key]
-        return {**record, "start_s": plain(self.start_s), "end_s": plain(self.end_s)}
+        return {**record, "start_s": json_value(self.start_s), "end_s": json_value(self.end_s)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,7 +148,7 @@ class ClearingResult:
         names = ("sim_time_s", "time_limit_s", "ticks", "min_singular_value", "near_singularity_s",
                  "in_basket", "knocked_off", "left", "failures", "timing", "state_hash")  # fmt: skip
         stops = [{**asdict(stop), "text": str(stop)} for stop in self.stops]
-        record: dict[str, Any] = plain(
+        record: dict[str, Any] = json_value(
             {
                 **{name: getattr(self, name) for name in names},
                 **{key: median(values) if values else None for key, values in reaches.items()},

@@ -2,43 +2,45 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Mapping
+from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 SIGNIFICANT_DIGITS = 9
 """Digits of floats in result files: more than anything here is measured to, fewer than the last bits."""
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """Return a JSON-ready copy: dataclasses and mappings as dicts, arrays, sequences and sets as lists.
 
-    Floats keep `SIGNIFICANT_DIGITS`; NaN and infinities become None. What JSON has no form for is given
-    by the name of its class, which is the same in every process.
+    Keys keep their order, floats `SIGNIFICANT_DIGITS`; NaN and infinities become None. What JSON has no form
+    for is given by the name of its class, which is the same in every process.
     """
-    return _rounded(msgspec.to_builtins(value, str_keys=True, enc_hook=_builtin, order="deterministic"))
-
-
-def _rounded(value: Any) -> Any:
-    """Return a value made of builtins with shorter floats, and with lists for tuples."""
-    if isinstance(value, float):
-        return float(f"{value:.{SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _builtin(value: Any) -> Any:
-    """Return what stands for a value that msgspec does not know."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
+    if value is None or (isinstance(value, bool | int | str) and not isinstance(value, Enum)):
+        return value
+    if isinstance(value, Enum):
+        return json_value(value.value)
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        return float(f"{number:.{SIGNIFICANT_DIGITS}g}") if math.isfinite(number) else None
+    if isinstance(value, np.bool_ | np.integer):
+        return value.item()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: json_value(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return dict(value)
+        return {str(json_value(key)): json_value(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return json_value(value.tolist())
+    if isinstance(value, list | tuple):
+        return [json_value(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted((json_value(item) for item in value), key=str)
     if isinstance(value, Path):
         return str(value)
     kind = value if isinstance(value, type) or callable(value) else type(value)
@@ -47,7 +49,7 @@ def _builtin(value: Any) -> Any:
 
 def one_line(record: Mapping[str, Any]) -> str:
     """Return a record as one line of JSON with sorted keys and a line end: equal records, equal bytes."""
-    return json.dumps(plain(record), sort_keys=True, allow_nan=False, separators=(", ", ": ")) + "\n"
+    return json.dumps(json_value(record), sort_keys=True, allow_nan=False, separators=(", ", ": ")) + "\n"
 
 
 class Difference(NamedTuple):

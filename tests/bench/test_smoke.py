@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bench_runs import records
 
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.exceptions import CameraError
@@ -26,8 +27,8 @@ def play(out: Path, *options: str) -> dict[str, Any]:
     command = [*COMMAND, "--episodes", "1", "--out", str(out), *options]
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    (line,) = (out / "episodes.jsonl").read_text().splitlines()
-    return json.loads(line)
+    (line,) = records(out)
+    return line
 
 
 @pytest.mark.parametrize("camera", ["ray", "gl"])

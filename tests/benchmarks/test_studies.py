@@ -33,7 +33,7 @@ def module(name: str) -> Any:
 
 @pytest.fixture(scope="module")
 def study() -> ModuleType:
-    return module("study")
+    return importlib.import_module("study")
 
 
 @pytest.mark.parametrize(("only_a", "only_b", "both"), [(8, 2, 5), (0, 6, 1), (3, 3, 0), (0, 0, 4)])
@@ -102,17 +102,20 @@ def test_published_tables_have_one_column_per_number(study: ModuleType, tmp_path
 # --- calibration and threshold -----------------------------------------------------------------
 
 
-def trial(quality: float, lifted: bool, scene: int = 0, **more: Any) -> dict[str, Any]:
-    return {
-        "detector": "d",
-        "quality": quality,
-        "peak_height": quality,
-        "lifted": lifted,
-        "graspable": True,
-        "outcome": "success" if lifted else "missed",
-        "scene": scene,
-        **more,
+def trial(quality: float, lifted: bool, scene: int = 0, **more: Any) -> Any:
+    known = {
+        "image": 0,
+        "camera_height": 0.4,
+        "thin": False,
+        "stacked": False,
+        "hit": True,
+        "rectangle": True,
     }
+    judged = {"graspable": True, "outcome": "success" if lifted else "missed"}
+    return module("single_view").Trial(
+        detector="d", quality=quality, peak_height=quality, lifted=lifted, scene=scene,
+        **{**known, **judged, **more},
+    )  # fmt: skip
 
 
 def test_a_detector_that_claims_what_it_achieves_has_no_calibration_error() -> None:
@@ -157,8 +160,8 @@ def test_the_chosen_threshold_is_the_best_of_all_by_counting_one_by_one() -> Non
     chosen = reliability.choose_threshold(lines, np.random.default_rng(0))
 
     def youden(threshold: float) -> float:
-        right = [line["peak_height"] > threshold for line in lines if line["lifted"]]
-        false = [line["peak_height"] > threshold for line in lines if not line["lifted"]]
+        right = [line.peak_height > threshold for line in lines if line.lifted]
+        false = [line.peak_height > threshold for line in lines if not line.lifted]
         return float(np.mean(right) - np.mean(false))
 
     best = max(np.linspace(0, 1, 101), key=youden)
@@ -194,8 +197,10 @@ def stack(positions: list[tuple[float, float, float]]) -> Any:
         ([(0, 0, 0.02), (0.005, 0, 0.0599)], True),
     ],
 )
-def test_a_stack_is_an_object_that_lies_on_another(positions: list, stacked: bool) -> None:
-    assert module("held_out").is_stacked(stack(positions)) is stacked
+def test_a_stack_is_an_object_that_lies_on_another(
+    positions: list[tuple[float, float, float]], stacked: bool
+) -> None:
+    assert module("single_view").is_stacked(stack(positions)) is stacked
 
 
 class Points:
@@ -236,9 +241,9 @@ class Rig:
 
 @pytest.fixture
 def held_out(monkeypatch: pytest.MonkeyPatch, study: ModuleType) -> Any:
-    found = module("held_out")
-    monkeypatch.setattr(found, "make_scene", lambda seed, index: (stack([(0, 0, 0.02)]), None))
-    monkeypatch.setattr(found, "LiftRig", Rig)
+    found, view = module("held_out"), module("single_view")
+    monkeypatch.setattr(view, "make_scene", lambda seed, index: (stack([(0, 0, 0.02)]), None))
+    monkeypatch.setattr(view, "LiftRig", Rig)
     made = {"sure": 0.8, "shy": 0.3, "blind": 0.0}
     monkeypatch.setattr(study, "load_detector", lambda name: Points(made[name]))
     return found
@@ -274,11 +279,10 @@ def test_every_detector_is_judged_on_the_same_views_and_its_grasps_are_executed(
 
 def test_groups_part_the_views(held_out: Any) -> None:
     low, high = held_out.CAMERA_HEIGHT
-    line = {"hit": True, "rectangle": True, "stacked": False}
     lines = [
-        trial(0.9, True, thin=k % 2 == 0, camera_height=float(h), **line)
+        trial(0.9, True, thin=k % 2 == 0, camera_height=float(h))
         for k, h in enumerate(np.linspace(low, high, 31))
-    ] + [trial(0.9, True, thin=True, camera_height=low, **line) | {"graspable": False}]
+    ] + [trial(0.9, True, thin=True, camera_height=low, graspable=False)]
     counts = {row["group"]: row["n"] for row in held_out.accuracy(lines)}
     assert counts["thin"] + counts["thick"] == counts["low"] + counts["mid"] + counts["high"] == 31
     assert counts["low"] == counts["mid"] == 10

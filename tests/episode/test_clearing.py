@@ -14,7 +14,8 @@ from scripted import Blind, Scripted
 from mpgrasp.controllers import make_controller
 from mpgrasp.controllers.controller import Observation
 from mpgrasp.detectors.oracle import OracleDetector
-from mpgrasp.episode.clearing import GUIDED_RATE, Basket, Clearing, run_clearing
+from mpgrasp.episode.basket import Basket
+from mpgrasp.episode.clearing import GUIDED_RATE, Clearing, run_clearing
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
 from mpgrasp.episode.episode import Episode
 from mpgrasp.episode.result import ClearingResult, EpisodeResult

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpgrasp.files.json_values import difference, one_line, plain
+from mpgrasp.files.json_values import difference, json_value, one_line
 from mpgrasp.outcome import Outcome
 
 
@@ -50,11 +50,16 @@ class Point:
     ],
 )
 def test_every_value_has_one_form_in_json(value: Any, expected: Any) -> None:
-    found = plain(value)
+    found = json_value(value)
     assert type(found) is type(expected)
     assert found == expected
-    assert plain(found) == found
+    assert json_value(found) == found
     assert json.loads(json.dumps(found, allow_nan=False)) == expected
+
+
+def test_keys_keep_their_order() -> None:
+    assert list(json_value({"b": 1, "a": 2})) == ["b", "a"]
+    assert list(json_value(Point(1.0))) == ["x", "rest"]
 
 
 def test_equal_records_have_equal_lines() -> None:

@@ -1,1 +1,1 @@
-"""What a set of episodes adds up to: summaries, pairs, tests, the paper's orderings."""
+"""Statistics of a set of episodes: summaries, pairs, tests, the paper's orderings."""

@@ -7,22 +7,21 @@ below the level of significance is no test, and left out (Tarone, Biometrics 46,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
 from mpgrasp.bench.analysis.pairing import pair_worlds
 from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Claim, Measure
 from mpgrasp.bench.analysis.summary import restricted_time, time_limits
-from mpgrasp.bench.record import Cells
+from mpgrasp.bench.record import Cell, Cells, PlayedLine
 from mpgrasp.statistics import FEWEST_PAIRS, SIGNIFICANCE, holm, mcnemar, wilcoxon
 
 
 class Verdict(StrEnum):
-    """What became of a claim."""
+    """Result of the test of a claim."""
 
     CONFIRMED = "confirmed"
     """Significant, in the direction that the paper claims."""
@@ -30,14 +29,14 @@ class Verdict(StrEnum):
     CONTRADICTED = "contradicted"
     """Significant, in the other direction."""
     UNDECIDABLE = "cannot be decided"
-    """Over so few worlds that it could not be significant, whatever came out."""
+    """The worlds are so few that nothing could be significant, whatever came out."""
     ABSENT = "not tested"
     """Cells or measurements are absent."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A claim, and what these runs have to say to it."""
+    """A claim, and the result of its test on these runs."""
 
     claim: Claim
     verdict: Verdict
@@ -50,20 +49,20 @@ class Finding:
     p_holm: float = np.nan
     """NaN where the claim cannot be decided."""
     absent: str = ""
-    """What is missing, in words."""
+    """Missing cells or measurements, in words."""
     agrees: bool = False
-    """Whether the difference has the direction claimed, significant or not."""
+    """True if the difference has the direction claimed, significant or not."""
 
 
-def cell_of(cells: Cells, suite: str, method: str, controller: str) -> tuple[str, str, str] | None:
+def cell_of(cells: Cells, suite: str, method: str, controller: str) -> Cell | None:
     """The cell of a run that stands for the paper's (detector, controller); None if there is none.
 
     One detector stands for a method throughout a suite: the first of its names that occurs there.
     """
-    there = {detector for name, detector, _ in cells if name == suite}
+    there = {cell.detector for cell in cells if cell.suite == suite}
     for detector in METHODS[method]:
         if detector in there:
-            cell = suite, detector, CONTROLLERS[controller]
+            cell = Cell(suite, detector, CONTROLLERS[controller])
             return cell if cell in cells else None
     return None
 
@@ -86,16 +85,16 @@ def _test(claim: Claim, cells: Cells) -> Finding:
         " + ".join(side) for side, key in zip((claim.better, claim.worse), keys, strict=True) if key is None
     ]
     if missing:
-        suite_there = any(suite == claim.suite for suite, _, _ in cells)
+        suite_there = any(cell.suite == claim.suite for cell in cells)
         text = " and ".join(missing) if suite_there else f"suite {claim.suite}"
         return Finding(claim=claim, verdict=Verdict.ABSENT, absent=f"{text} absent")
     limit = time_limits(cells)[claim.suite]
-    sides = [[_with_value(line, claim.measure, limit) for line in cells[key]] for key in keys if key]
-    pairs = [
-        (one["value"], other["value"])
+    sides = [cells[key] for key in keys if key]
+    values = [
+        (_value(one, claim.measure, limit), _value(other, claim.measure, limit))
         for one, other in pair_worlds(*sides)
-        if one["value"] is not None and other["value"] is not None
     ]
+    pairs = [both for both in values if None not in both]
     if not pairs:
         return Finding(claim=claim, verdict=Verdict.ABSENT, absent="no common episode with this measurement")
     better, worse = np.array(pairs, float).T
@@ -116,18 +115,17 @@ def _test(claim: Claim, cells: Cells) -> Finding:
     )
 
 
-def _with_value(line: Mapping[str, Any], measure: Measure, limit: float | None) -> dict[str, Any]:
-    value: float | None
+def _value(line: PlayedLine, measure: Measure, limit: float | None) -> float | None:
+    """Value of an episode that a claim compares; None where it was not measured."""
     match measure:
         case Measure.SUCCESS:
-            value = line.get("success")
+            return line.success
         case Measure.REFLEX:
-            value = line.get("reflex") is not None
+            return line.reflex is not None
         case Measure.TIME:
-            value = None if line.get("sim_time_s") is None else restricted_time(line, limit)
+            return restricted_time(line, limit)
         case Measure.DRIFT:
-            value = line.get("blind_drift_m")
-    return {**line, "value": value}
+            return line.blind_drift_m
 
 
 def count_verdicts(findings: Iterable[Finding]) -> dict[Verdict, int]:

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from mpgrasp.bench.record import ERROR
+from mpgrasp.bench.record import ErrorLine, Line, PlayedLine, played
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.statistics import mcnemar, mean_interval
 
 
+class World(NamedTuple):
+    """One scene with its start pose and sensor noise, which every detector and controller meets alike."""
+
+    suite: str
+    seed: int
+    episode: int
+
+
 @dataclass(frozen=True, kw_only=True)
 class Pairing:
-    """What two sets of episodes have in common."""
+    """Counts over the episodes that two cells have in common."""
 
     n: int
     """Worlds that both played."""
@@ -33,7 +41,7 @@ class Pairing:
     identical: int
     """Worlds that both left in the same state, bit by bit."""
     p: float
-    """Two-sided, of McNemar's exact test."""
+    """Two-sided p of McNemar's exact test."""
     time_difference_s: float
     """Mean of B's simulated time minus A's where both succeeded [s]."""
     time_low: float
@@ -50,7 +58,7 @@ class Pairing:
         return (self.both + self.b_alone) / self.n if self.n else np.nan
 
 
-def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pairing:
+def pair(a: Iterable[Line], b: Iterable[Line]) -> Pairing:
     """Pair the lines of two cells by suite, seed and episode; error rows are counted apart.
 
     Raises:
@@ -58,12 +66,10 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
     """
     a, b = list(a), list(b)
     pairs = pair_worlds(a, b)
-    errors_a, errors_b = ([line for line in lines if line["outcome"] == ERROR] for lines in (a, b))
+    errors_a, errors_b = ([line for line in lines if isinstance(line, ErrorLine)] for lines in (a, b))
     lost = ({_world(line) for line in errors_b} & _by_world(a).keys()) - _by_world(b).keys()
-    wins = [(bool(one["success"]), bool(other["success"])) for one, other in pairs]
-    times = [
-        other["sim_time_s"] - one["sim_time_s"] for one, other in pairs if one["success"] and other["success"]
-    ]
+    wins = [(one.success, other.success) for one, other in pairs]
+    times = [other.sim_time_s - one.sim_time_s for one, other in pairs if one.success and other.success]
     difference, low, high = mean_interval(times)
     a_alone, b_alone = wins.count((True, False)), wins.count((False, True))
     return Pairing(
@@ -74,8 +80,8 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
         both=wins.count((True, True)),
         a_alone=a_alone,
         b_alone=b_alone,
-        same_outcome=sum(one["outcome"] == other["outcome"] for one, other in pairs),
-        identical=sum(one["state_hash"] == other["state_hash"] for one, other in pairs),
+        same_outcome=sum(one.outcome == other.outcome for one, other in pairs),
+        identical=sum(one.state_hash == other.state_hash for one, other in pairs),
         p=mcnemar(a_alone, b_alone),
         time_difference_s=difference,
         time_low=low,
@@ -83,9 +89,7 @@ def pair(a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]) -> Pair
     )
 
 
-def pair_worlds(
-    a: Iterable[Mapping[str, Any]], b: Iterable[Mapping[str, Any]]
-) -> list[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+def pair_worlds(a: Iterable[Line], b: Iterable[Line]) -> list[tuple[PlayedLine, PlayedLine]]:
     """The lines of A and B about the same suite, seed and episode; error rows are left out.
 
     Raises:
@@ -94,26 +98,24 @@ def pair_worlds(
     ours, theirs = _by_world(a), _by_world(b)
     pairs = [(ours[key], theirs[key]) for key in ours if key in theirs]
     for one, other in pairs:
-        if one["scene_seed"] != other["scene_seed"]:
+        if one.scene_seed != other.scene_seed:
             raise ConfigError(
-                f"episode {one['episode']} of {one['suite']} had another scene in the other run",
-                got=(one["scene_seed"], other["scene_seed"]),
+                f"episode {one.episode} of {one.suite} had another scene in the other run",
+                got=(one.scene_seed, other.scene_seed),
                 allowed="the same scene_seed",
             )
     return pairs
 
 
-def _by_world(lines: Iterable[Mapping[str, Any]]) -> dict[Hashable, Mapping[str, Any]]:
-    worlds: dict[Hashable, Mapping[str, Any]] = {}
-    for line in lines:
+def _by_world(lines: Iterable[Line]) -> dict[World, PlayedLine]:
+    worlds: dict[World, PlayedLine] = {}
+    for line in played(lines):
         key = _world(line)
-        if line["outcome"] == ERROR:
-            continue
         if key in worlds:
-            raise ConfigError("an episode occurs twice in one cell", got=key, allowed="one line each")
+            raise ConfigError("an episode occurs twice in one cell", got=tuple(key), allowed="one line each")
         worlds[key] = line
     return worlds
 
 
-def _world(line: Mapping[str, Any]) -> Hashable:
-    return line["suite"], line["seed"], line["episode"]
+def _world(line: Line) -> World:
+    return World(line.suite, line.seed, line.episode)

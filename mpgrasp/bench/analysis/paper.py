@@ -1,4 +1,4 @@
-"""What the paper reports of its physical trials, Tables III to VI, and the orderings that it claims.
+"""Numbers that the paper reports of its physical trials, Tables III to VI, and the orderings that it claims.
 
 References:
     The paper, Section IV-D: Tables III (single objects), IV (unseen toys), V (thin objects) and VI
@@ -19,7 +19,7 @@ CELLS = tuple((method, controller) for method in METHODS for controller in CONTR
 
 
 class Measure(StrEnum):
-    """What an ordering is about."""
+    """Quantity that an ordering compares."""
 
     SUCCESS = "success rate"
     TIME = "time"
@@ -37,7 +37,7 @@ class Claim:
     """(detector, controller) in the paper's words."""
     worse: tuple[str, str]
     source: str
-    """Where the paper says so."""
+    """Table or section of the paper that says so."""
 
 
 SINGLE = {

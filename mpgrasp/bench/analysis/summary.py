@@ -1,33 +1,114 @@
-"""What a set of episodes adds up to: one row per cell, and a paired test for every two cells."""
+"""Summary of a set of episodes: one row per cell, and a paired test for every two cells of a suite."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 from statistics import median
-from typing import Any
+
+import msgspec
 
 from mpgrasp.bench.analysis.pairing import pair
-from mpgrasp.bench.record import ERROR, Cells, by_cell
+from mpgrasp.bench.record import Cell, Cells, ClearingLine, Line, Method, PlayedLine, Record, by_cell, played
 from mpgrasp.episode.result import MOTION
+from mpgrasp.outcome import Outcome
 from mpgrasp.statistics import holm, mean_interval, median_interval, restricted, wilson_interval
 
 
-def summarise(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """One JSON-ready row per cell (suite, detector, controller), in order of first appearance.
+class ObjectCounts(Record, frozen=True, kw_only=True):
+    """Grasps of one object."""
 
-    Keys: suite, detector, controller; n (error rows do not count), errors, successes, rate, wilson_low,
-    wilson_high; median_time_s, median_time_low, median_time_high; mean_time_s, mean_time_low,
-    mean_time_high and time_limit_s (of the restricted mean where an episode of the suite hit its limit,
-    else None); reflex_stops, reflexes {limit: count}, failures {outcome: count}, objects
-    {name: {n, successes}}, motion {key: median} and worst_singular_value; clearing: None or, over all
-    episodes in which a table was to be cleared, attempts, failed_attempts {outcome: count}, and numbers of
-    objects in_basket, knocked_off and left.
-    """
-    cells = by_cell(episodes)
+    n: int
+    successes: int
+
+
+class ClearingCounts(Record, frozen=True, kw_only=True):
+    """Attempts and objects, added up over all episodes in which a table was to be cleared."""
+
+    attempts: int
+    failed_attempts: dict[str, int]
+    """Attempts that put nothing into the basket, by outcome."""
+    in_basket: int
+    knocked_off: int
+    left: int
+
+
+class CellSummary(Record, frozen=True, kw_only=True):
+    """Summary of the episodes of one cell."""
+
+    suite: str
+    detector: str
+    controller: str
+    n: int
+    """Episodes that were played; error rows do not count."""
+    errors: int
+    successes: int
+    rate: float | None
+    """Success rate [0, 1]; None where nothing was played."""
+    wilson_low: float
+    wilson_high: float
+    median_time_s: float | None
+    """Median of the simulated times [s]; it and the values below are None where there are too few times."""
+    median_time_low: float | None
+    median_time_high: float | None
+    mean_time_s: float | None
+    """Mean of the simulated times, restricted to `time_limit_s` where that is given [s]."""
+    mean_time_low: float | None
+    mean_time_high: float | None
+    time_limit_s: float | None
+    """Time at which episodes of the suite were broken off [s]; None where none hit the limit."""
+    reflex_stops: int
+    reflexes: dict[str, int]
+    """Protective stops by the limit that was broken."""
+    failures: dict[str, int]
+    """Failed episodes by outcome."""
+    objects: dict[str, ObjectCounts]
+    """Grasps by object."""
+    motion: dict[str, float]
+    """Medians of `MOTION`, of those that were measured."""
+    worst_singular_value: float | None
+    clearing: ClearingCounts | None
+    """None where no table was to be cleared."""
+
+    @property
+    def cell(self) -> Cell:
+        """The cell whose episodes these are."""
+        return Cell(self.suite, self.detector, self.controller)
+
+
+class PairedTest(Record, frozen=True, kw_only=True):
+    """Two cells of a suite over the worlds that both met."""
+
+    suite: str
+    a: Method
+    b: Method
+    n: int
+    both: int
+    """Worlds in which both succeeded."""
+    a_alone: int
+    b_alone: int
+    p: float
+    """Two-sided p of McNemar's exact test."""
+    p_holm: float
+    """The same after Holm's correction over all tests of the suite."""
+
+
+class RunSummary(Record, frozen=True, kw_only=True):
+    """Content of summary.json."""
+
+    complete: bool
+    """False while episodes are missing or could not be played."""
+    cells: tuple[CellSummary, ...]
+    paired_tests: tuple[PairedTest, ...]
+
+
+def summarise(lines: Iterable[Line]) -> list[CellSummary]:
+    """One row per cell (suite, detector, controller), in order of first appearance."""
+    cells = by_cell(lines)
     limits = time_limits(cells)
-    return [_cell(*key, lines, limits[key[0]]) for key, lines in cells.items()]
+    return [_summary(cell, of_cell, limits[cell.suite]) for cell, of_cell in cells.items()]
 
 
 def time_limits(cells: Cells) -> dict[str, float | None]:
@@ -35,110 +116,117 @@ def time_limits(cells: Cells) -> dict[str, float | None]:
 
     Tables that were not cleared, for whatever reason, count as hits of the limit that their lines give.
     """
-    limits: dict[str, float | None] = {suite: None for suite, _, _ in cells}
-    for (suite, _, _), lines in cells.items():
-        for line in lines:
-            hit = line.get("time_limit_s") if not line["success"] else None
-            if hit is None and line["outcome"] == "timeout":
-                hit = line["sim_time_s"]
-            before = limits[suite]
+    limits: dict[str, float | None] = {cell.suite: None for cell in cells}
+    for cell, lines in cells.items():
+        for line in played(lines):
+            hit = line.time_limit_s if isinstance(line, ClearingLine) and not line.success else None
+            if hit is None and line.outcome is Outcome.TIMEOUT:
+                hit = line.sim_time_s
+            before = limits[cell.suite]
             if hit is not None:
-                limits[suite] = hit if before is None else min(before, hit)
+                limits[cell.suite] = hit if before is None else min(before, hit)
     return limits
 
 
-def restricted_time(line: Mapping[str, Any], limit: float | None = None) -> float:
+def restricted_time(line: PlayedLine, limit: float | None = None) -> float:
     """Simulated time of an episode cut off at its limit, or else at `limit` [s].
 
     Who has not got to the end took at least as long as is allowed.
     """
-    time, allowed = float(line["sim_time_s"]), line.get("time_limit_s", limit)
+    allowed = line.time_limit_s if isinstance(line, ClearingLine) else limit
     if allowed is None:
-        return time
-    return min(time, float(allowed)) if line["success"] else float(allowed)
+        return line.sim_time_s
+    return min(line.sim_time_s, allowed) if line.success else allowed
 
 
-def _cell(
-    suite: str, detector: str, controller: str, lines: list[Mapping[str, Any]], limit: float | None
-) -> dict[str, Any]:
-    played = [line for line in lines if line["outcome"] != ERROR]
-    n, successes = len(played), sum(bool(line["success"]) for line in played)
+def _summary(cell: Cell, of_cell: Sequence[Line], limit: float | None) -> CellSummary:
+    lines = played(of_cell)
+    n, successes = len(lines), sum(line.success for line in lines)
     low, high = wilson_interval(successes, n)
-    times = [restricted_time(line) for line in played]
+    times = [restricted_time(line) for line in lines]
     middle, middle_low, middle_high = median_interval(times)
     mean, mean_low, mean_high = mean_interval(restricted(times, limit))
-    objects: dict[str, dict[str, int]] = {}
-    for line in played:
-        counts = objects.setdefault(str(line["object"]), {"n": 0, "successes": 0})
-        counts["n"] += 1
-        counts["successes"] += bool(line["success"])
-    values = {key: [line[key] for line in played if line.get(key) is not None] for key in MOTION}
-    reflexes = [stop["limit"] for line in played for stop in stops_of(line)]
-    return {
-        "suite": suite,
-        "detector": detector,
-        "controller": controller,
-        "n": n,
-        "errors": len(lines) - n,
-        "successes": successes,
-        "rate": successes / n if n else None,
-        "wilson_low": low,
-        "wilson_high": high,
-        "median_time_s": middle if times else None,
-        "median_time_low": middle_low,
-        "median_time_high": middle_high,
-        "mean_time_s": mean,
-        "mean_time_low": mean_low,
-        "mean_time_high": mean_high,
-        "time_limit_s": limit,
-        "reflex_stops": len(reflexes),
-        "reflexes": dict(sorted(Counter(reflexes).items())),
-        "failures": dict(sorted(Counter(line["outcome"] for line in played if not line["success"]).items())),
-        "objects": dict(sorted(objects.items())),
-        "motion": {key: median(numbers) for key, numbers in values.items() if numbers},
-        "worst_singular_value": min(values["min_singular_value"], default=None),
-        "clearing": _clearing([line for line in played if "picks" in line]),
-    }
+    values = {key: [value for line in lines if (value := getattr(line, key)) is not None] for key in MOTION}
+    stops = Counter(stop.limit for line in lines for stop in line.all_stops)
+    failures = Counter(line.outcome.value for line in lines if not line.success)
+    return CellSummary(
+        **cell._asdict(),
+        n=n,
+        errors=len(of_cell) - n,
+        successes=successes,
+        rate=successes / n if n else None,
+        wilson_low=low,
+        wilson_high=high,
+        median_time_s=_known(middle),
+        median_time_low=_known(middle_low),
+        median_time_high=_known(middle_high),
+        mean_time_s=_known(mean),
+        mean_time_low=_known(mean_low),
+        mean_time_high=_known(mean_high),
+        time_limit_s=limit,
+        reflex_stops=stops.total(),
+        reflexes=dict(sorted(stops.items())),
+        failures=dict(sorted(failures.items())),
+        objects=_by_object(lines),
+        motion={key: median(numbers) for key, numbers in values.items() if numbers},
+        worst_singular_value=min(values["min_singular_value"], default=None),
+        clearing=_clearing([line for line in lines if isinstance(line, ClearingLine)]),
+    )
 
 
-def stops_of(line: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """All protective stops of an episode."""
-    if "stops" in line:
-        return list(line["stops"])
-    return [] if line["reflex"] is None else [line["reflex"]]
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
-def _clearing(lines: list[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """What became of attempts and objects where tables were to be cleared; None where none were."""
+def _by_object(lines: Sequence[PlayedLine]) -> dict[str, ObjectCounts]:
+    endings: dict[str, list[bool]] = {}
+    for line in lines:
+        endings.setdefault(line.object, []).append(line.success)
+    return {name: ObjectCounts(n=len(ends), successes=sum(ends)) for name, ends in sorted(endings.items())}
+
+
+def _clearing(lines: Sequence[ClearingLine]) -> ClearingCounts | None:
     if not lines:
         return None
-    failures = Counter(
-        pick["outcome"] for line in lines for pick in line["picks"] if pick["outcome"] != "success"
+    outcomes = Counter(pick.outcome for line in lines for pick in line.picks)
+    return ClearingCounts(
+        attempts=outcomes.total(),
+        failed_attempts={
+            outcome.value: count for outcome, count in sorted(outcomes.items()) if outcome != Outcome.SUCCESS
+        },
+        in_basket=sum(len(line.in_basket) for line in lines),
+        knocked_off=sum(len(line.knocked_off) for line in lines),
+        left=sum(len(line.left) for line in lines),
     )
-    return {
-        "attempts": sum(len(line["picks"]) for line in lines),
-        "failed_attempts": dict(sorted(failures.items())),
-        **{key: sum(len(line[key]) for line in lines) for key in ("in_basket", "knocked_off", "left")},
-    }
 
 
-def paired_tests(episodes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """One JSON-ready row per two cells of a suite over the worlds that both met.
-
-    Keys: suite, a and b as [detector, controller], n, both, a_alone, b_alone, p (McNemar, exact,
-    two-sided) and p_holm, corrected over all rows of the suite.
-    """
-    rows: list[dict[str, Any]] = []
-    for (key_a, lines_a), (key_b, lines_b) in combinations(by_cell(episodes).items(), 2):
-        if key_a[0] != key_b[0]:
+def paired_tests(lines: Iterable[Line]) -> list[PairedTest]:
+    """One row per two cells of a suite over the worlds that both met."""
+    rows: list[PairedTest] = []
+    for (cell_a, lines_a), (cell_b, lines_b) in combinations(by_cell(lines).items(), 2):
+        if cell_a.suite != cell_b.suite:
             continue
         found = pair(lines_a, lines_b)
         rows.append(
-            {"suite": key_a[0], "a": list(key_a[1:]), "b": list(key_b[1:]), "n": found.n}
-            | {name: getattr(found, name) for name in ("both", "a_alone", "b_alone", "p")}
+            PairedTest(
+                suite=cell_a.suite,
+                a=cell_a.method,
+                b=cell_b.method,
+                n=found.n,
+                both=found.both,
+                a_alone=found.a_alone,
+                b_alone=found.b_alone,
+                p=found.p,
+                p_holm=found.p,
+            )
         )
-    for suite in {row["suite"] for row in rows}:
-        family = [row for row in rows if row["suite"] == suite]
-        for row, p in zip(family, holm([row["p"] for row in family]), strict=True):
-            row["p_holm"] = p
-    return rows
+    return _corrected(rows)
+
+
+def _corrected(rows: Sequence[PairedTest]) -> list[PairedTest]:
+    """The rows with Holm's correction over those of a suite."""
+    corrected: dict[int, float] = {}
+    for suite in {row.suite for row in rows}:
+        family = [k for k, row in enumerate(rows) if row.suite == suite]
+        corrected.update(zip(family, holm([rows[k].p for k in family]), strict=True))
+    return [msgspec.structs.replace(row, p_holm=corrected[k]) for k, row in enumerate(rows)]

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from mpgrasp.bench.analysis.pairing import Pairing, pair, pair_worlds
 from mpgrasp.bench.analysis.summary import restricted_time
-from mpgrasp.bench.record import Cells
+from mpgrasp.bench.record import Cell, Cells, ClearingLine, Line
 from mpgrasp.bench.report.terminal import wide_console
-from mpgrasp.bench.results.cell_path import CellName, read_cells
+from mpgrasp.bench.results.cell_path import read_cells
 from mpgrasp.bench.results.reader import read_run
+from mpgrasp.bench.results.run_card import Card, Configuration
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.json_values import Difference, difference
@@ -53,34 +53,34 @@ def make_parser() -> Parser:
 
 @dataclass(frozen=True, kw_only=True)
 class TimeTest:
-    """How long two cells took to clear the same tables, cut off at the limit; who did not, took the limit."""
+    """Test of the times in which two cells cleared the same tables, cut off at the limit."""
 
     mean_a: float
-    """[s]"""
+    """Mean time; a table that was not cleared counts as the limit [s]."""
     mean_b: float
     """[s]"""
     p: float
-    """Two-sided, of Wilcoxon's signed-rank test."""
+    """Two-sided p of Wilcoxon's signed-rank test."""
     slower: bool
-    """Whether B's times tend to be the longer ones, significantly or not."""
+    """True if B's times tend to be the longer ones, significantly or not."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """A cell of A beside one of B."""
 
-    a: CellName
-    b: CellName
+    a: Cell
+    b: Cell
     pairing: Pairing
     times: TimeTest | None
     """None unless both cleared tables."""
     p_success: float = math.nan
-    """Of McNemar's test, after Holm's correction; NaN where there is no episode that both played."""
+    """p of McNemar's test after Holm's correction; NaN where there is no episode that both played."""
     p_times: float = math.nan
 
     @property
     def differences(self) -> dict[str, bool]:
-        """What is to be said of B, and whether it makes B worse; empty if there is no difference."""
+        """Significant differences of B in words, True where they make B worse; empty if there are none."""
         found = {}
         if self.p_success < SIGNIFICANCE:
             worse = self.pairing.rate_b < self.pairing.rate_a
@@ -92,18 +92,21 @@ class Comparison:
         return found
 
 
-def unequal_conditions(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Difference]:
-    """Where two configurations differ in what decides the worlds and the episodes that both played."""
-    one, other = _suites(before), _suites(after)
-    found = [difference(before.get(key), after.get(key), key) for key in _SHARED]
-    found += [difference(one[name], other[name], name) for name in one if name in other]
+def unequal_conditions(before: Configuration, after: Configuration) -> list[Difference]:
+    """Differences of two configurations in what decides the worlds and the episodes that both played."""
+    one, other = before.as_row(), after.as_row()
+    found = [difference(one[key], other[key], key) for key in _SHARED]
+    ours, theirs = _suites(before), _suites(after)
+    found += [difference(ours[name], theirs[name], name) for name in ours if name in theirs]
     return [changed for changed in found if changed]
 
 
-def _suites(configuration: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Declaration and settings by suite, of a run of one suite or of a programme of several."""
-    parts = configuration.get("suites") or [configuration]
-    return {part["suite"]["name"]: {key: part.get(key) for key in ("suite", "episode")} for part in parts}
+def _suites(configuration: Configuration) -> dict[str, Card]:
+    """Declaration and settings by suite."""
+    return {
+        part.suite.name: {"suite": part.suite.as_row(), "episode": part.episode}
+        for part in configuration.parts
+    }
 
 
 def compare(a: Cells, b: Cells) -> list[Comparison]:
@@ -117,14 +120,13 @@ def compare(a: Cells, b: Cells) -> list[Comparison]:
     else:
         couples = [(name, name) for name in a if name in b]
     rows = [
-        Comparison(a=CellName(*x), b=CellName(*y), pairing=pair(a[x], b[y]), times=compare_times(a[x], b[y]))
-        for x, y in couples
+        Comparison(a=x, b=y, pairing=pair(a[x], b[y]), times=compare_times(a[x], b[y])) for x, y in couples
     ]
     rows = [row for row in rows if row.pairing.n or row.pairing.lost]
     if not rows:
         raise ConfigError(
             "the runs have no episode in common",
-            got=[[f"{n.suite}/{n}" for n in map(CellName._make, cells)] for cells in (a, b)],
+            got=[[str(cell) for cell in cells] for cells in (a, b)],
             allowed="cells of the same names or one on each side, with the same suite and seed",
         )
     success = [row.pairing.p for row in rows if row.pairing.n]
@@ -140,12 +142,14 @@ def compare(a: Cells, b: Cells) -> list[Comparison]:
     ]
 
 
-def compare_times(a: Sequence[Mapping[str, Any]], b: Sequence[Mapping[str, Any]]) -> TimeTest | None:
+def compare_times(a: Sequence[Line], b: Sequence[Line]) -> TimeTest | None:
     """Test the times of two cells over the tables that both had to clear; None if there are none."""
-    pairs = [(x, y) for x, y in pair_worlds(a, b) if "time_limit_s" in x and "time_limit_s" in y]
+    pairs = [
+        (x, y) for x, y in pair_worlds(a, b) if isinstance(x, ClearingLine) and isinstance(y, ClearingLine)
+    ]
     if not pairs:
         return None
-    limit = min(line["time_limit_s"] for both in pairs for line in both)  # the same for A and B
+    limit = min(line.time_limit_s for both in pairs for line in both)  # the same for A and B
     times_a, times_b = (
         restricted([restricted_time(line) for line in side], limit) for side in zip(*pairs, strict=True)
     )
@@ -163,17 +167,17 @@ def main(command: Sequence[str]) -> int:
     (folder_a, a), (folder_b, b) = read_cells(arguments.a), read_cells(arguments.b)
     rows = compare(a, b)
     print(f"A = {folder_a}\nB = {folder_b}")
-    before, after = (read_run(folder)["configuration"] for folder in (folder_a, folder_b))
+    before, after = (read_run(folder).configuration for folder in (folder_a, folder_b))
     for changed in unequal_conditions(before, after):
         print(f"Not the same in both: {changed.words('in A', 'in B')}")
     for side, cells, shown in (("A", a, {row.a for row in rows}), ("B", b, {row.b for row in rows})):
-        alone = [f"{name.suite}/{name}" for name in map(CellName._make, cells) if name not in shown]
+        alone = [str(cell) for cell in cells if cell not in shown]
         if alone:
             print(f"In {side} alone, so not compared: {', '.join(alone)}")
     wide_console().print(_table(rows))
     lost = [(row.pairing.lost, row.pairing.lost + row.pairing.n, row.b) for row in rows if row.pairing.lost]
     if lost:
-        text = ", ".join(f"{k} of {n} of {name.suite}/{name}" for k, n, name in lost)
+        text = ", ".join(f"{k} of {n} of {cell}" for k, n, cell in lost)
         print(f"B is worse: episodes that A played are errors in B: {text}")
     return EXIT_WORSE if any(worse for row in rows for worse in row.differences.values()) else 0
 
@@ -194,7 +198,7 @@ def _table(rows: Sequence[Comparison]) -> Table:
     for row in rows:
         found = row.pairing
         table.add_row(
-            row.a.suite, str(row.a), str(row.b), str(found.n),
+            row.a.suite, str(row.a.method), str(row.b.method), str(found.n),
             *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
             _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
             _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),

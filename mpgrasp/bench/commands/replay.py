@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
-from argparse import RawDescriptionHelpFormatter
+from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from mpgrasp.bench.playing.description import configuration
-from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import Player
-from mpgrasp.bench.playing.recorded_command import recorded_arguments
-from mpgrasp.bench.playing.run import make_plan
-from mpgrasp.bench.record import ERROR, Cell, Line, Task
-from mpgrasp.bench.results.cell_path import find_cell
-from mpgrasp.bench.results.provenance import provenance
-from mpgrasp.bench.results.reader import read_lines, read_run
+from msgspec.structs import replace as replace_fields
+
+from mpgrasp.bench.record import Cell, ErrorLine, Line, PlayedLine, Task
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.json_values import difference, plain
+from mpgrasp.files.json_values import difference
+
+if TYPE_CHECKING:
+    from mpgrasp.bench.playing.plan import Plan
+    from mpgrasp.bench.results.run_card import Configuration
 
 EXIT_DIFFERENT = 1
 
@@ -48,7 +46,7 @@ def make_parser() -> Parser:
         metavar="[S/]D/C",
         help="[suite/]detector/controller; may be left out where the run has one cell",
     )
-    add("--record", action="store_true", help="record it, for rerun and as GIF")
+    add("--record", action="store_true", help="record it, for rerun, as GIF and for the report")
     add(
         "--weights",
         metavar="[D=]FILE",
@@ -67,74 +65,88 @@ def main(command: Sequence[str]) -> int:
         MpgraspError: input that cannot be used.
     """
     from mpgrasp.bench.commands.run import make_parser as run_parser
+    from mpgrasp.bench.playing.description import configuration
+    from mpgrasp.bench.playing.player import Player
+    from mpgrasp.bench.playing.recorded_command import recorded_arguments
+    from mpgrasp.bench.playing.run import make_plan
+    from mpgrasp.bench.results.provenance import provenance
+    from mpgrasp.bench.results.reader import read_run
 
     arguments = make_parser().parse_args(command)
     run = read_run(arguments.run)
     given = [word for file in arguments.weights for word in ("--weights", file)]
     plan, _ = make_plan(recorded_arguments(arguments.run, run_parser(), given))
     plan, task = _one_episode(plan, arguments)
-    before = _recorded_line(arguments.run, plan, task)
+    before = _recorded_line(arguments.run, task)
     player = Player(plan)
-    changed = _difference_of_configurations(run["configuration"], plain(configuration(plan, player)), task)
+    changed = _difference_of_configurations(run.configuration, configuration(plan, player), task)
     if changed:
         print(f"The configuration is another one: {changed}")
-    made_with = difference(run.get("made_with"), plain(provenance()))
+    made_with = difference(run.made_with.as_row(), provenance().as_row())
     if made_with:
         print(f"Not made with the same: {made_with.words('then', 'now')}")
-    line = plain(player.play(task))
+    line = player.play(task)
     if plan.record:
         print(f"Recorded: {plan.recordings}/{task.stem}.*")
     return _report(task, before, line)
 
 
-def _one_episode(plan: Plan, arguments: Any) -> tuple[Plan, Task]:
-    """The plan with one cell left, and the task."""
-    cells = [(suite.name, *cell) for suite in plan.suites for cell in plan.cells]
+def _one_episode(plan: Plan, arguments: Namespace) -> tuple[Plan, Task]:
+    """The plan with one method left, and the task."""
+    from mpgrasp.bench.results.cell_path import find_cell
+
+    cells = [Cell(suite.name, *method) for suite in plan.suites for method in plan.methods]
     if arguments.cell is None and len(cells) > 1:
-        names = [f"{s}/{d}/{c}" if len(plan.suites) > 1 else f"{d}/{c}" for s, d, c in cells]
+        names = [str(cell if len(plan.suites) > 1 else cell.method) for cell in cells]
         raise ConfigError("the run has several cells", allowed=[f"--cell {name}" for name in names])
     if arguments.episode < 0:
         raise ConfigError("episode out of range", got=arguments.episode, allowed="0, 1, 2, ...")
-    cell = find_cell(cells, arguments.cell or "/".join(cells[0]))
-    task = Task(
-        suite=cell.suite, episode=arguments.episode, detector=cell.detector, controller=cell.controller
-    )
+    cell = find_cell(cells, arguments.cell or str(cells[0]))
+    task = Task(cell.suite, arguments.episode, cell.detector, cell.controller)
+    recordings = arguments.out or arguments.run / "recordings"
     plan = replace(
         plan,
-        cells=(Cell(cell.detector, cell.controller),),
+        methods=(cell.method,),
         weights={name: file for name, file in plan.weights.items() if name == cell.detector},
         record=task.episode + 1 if arguments.record else 0,
-        recordings=arguments.out or arguments.run / "recordings",
-        traces=None,
+        recordings=recordings,
+        traces=recordings if arguments.record else None,
     )
     return plan, task
 
 
-def _recorded_line(folder: Path, plan: Plan, task: Task) -> Line:
-    lines = [line for line in read_lines(folder).lines if Task.of(line) == task]
+def _recorded_line(folder: Path, task: Task) -> Line:
+    from mpgrasp.bench.results.reader import read_lines
+
+    lines = [line for line in read_lines(folder).lines if line.task == task]
     if not lines:
         raise ConfigError(f"the run has no {task}", got=str(folder), allowed="an episode that was played")
     return lines[-1]
 
 
-def _difference_of_configurations(then: dict[str, Any], now: dict[str, Any], task: Task) -> str | None:
-    """What has changed of the one cell, in words; other cells of the run do not matter."""
-    names = {"detectors": task.detector, "controllers": task.controller}
-    kept = {key: [item for item in then[key] if item["name"] == name] for key, name in names.items()}
-    found = difference({**then, **kept, "cells": now["cells"]}, now)
+def _difference_of_configurations(then: Configuration, now: Configuration, task: Task) -> str | None:
+    """Difference in what decides the one cell, in words; other cells of the run do not matter."""
+    alike = replace_fields(
+        then,
+        cells=now.cells,
+        detectors=tuple(card for card in then.detectors if card.name == task.detector),
+        controllers=tuple(card for card in then.controllers if card.name == task.controller),
+    )
+    found = difference(alike.as_row(), now.as_row())
     return found and found.words("then", "now")
 
 
-def _report(task: Task, before: Line, now: Line) -> int:
-    if before["outcome"] == ERROR:
-        print(f"{task}: an error then ({before['error']}), {now['outcome']} now")
+def _report(task: Task, before: Line, now: PlayedLine) -> int:
+    if isinstance(before, ErrorLine):
+        print(f"{task}: an error then ({before.error}), {now.outcome} now")
         return EXIT_DIFFERENT
-    keys = sorted((before.keys() | now.keys()) - {"timing"})
-    different = [key for key in keys if before.get(key) != now.get(key)]
+    row_before, row_now = before.as_row(), now.as_row()
+    keys = sorted((row_before.keys() | row_now.keys()) - {"timing"})
+    different = [key for key in keys if row_before.get(key) != row_now.get(key)]
     if not different:
-        print(f"{task}: {now['outcome']}, bit for bit the same as in the run ({now['state_hash'][:12]})")
+        print(f"{task}: {now.outcome}, bit for bit the same as in the run ({now.state_hash[:12]})")
         return 0
-    print(f"{task}: {now['outcome']}, not the same as in the run")
+    print(f"{task}: {now.outcome}, not the same as in the run")
     for key in different:
-        print(f"  {key}: {json.dumps(before.get(key))} then, {json.dumps(now.get(key))} now")
+        print(f"  {key}: {json.dumps(row_before.get(key))} then, {json.dumps(row_now.get(key))} now")
     return EXIT_DIFFERENT

@@ -38,9 +38,9 @@ exit code: 0 all episodes played, 1 some could not be played, 2 unusable input o
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
-    from mpgrasp.bench.playing.plan import CAMERA_BACKENDS
     from mpgrasp.bench.playing.programme import PROGRAMMES
     from mpgrasp.bench.playing.workers import HANG_AFTER
+    from mpgrasp.camera.backends import BACKENDS
     from mpgrasp.detectors.runtimes import RUNTIMES
     from mpgrasp.plugins import controller_names, detector_names
     from mpgrasp.suite import suite_names
@@ -142,7 +142,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add(
         "--camera",
-        metavar="|".join(CAMERA_BACKENDS),
+        metavar="|".join(BACKENDS),
         default="auto",
         help="rasterised through OpenGL, ray-cast without it, or whichever is there (default: auto)",
     )

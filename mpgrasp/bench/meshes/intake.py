@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from mpgrasp.bench.meshes.check import Verdict, examine, is_cached
+from mpgrasp.bench.meshes.check import MeshVerdict, examine, is_cached
 from mpgrasp.bench.meshes.files import ObjectFile, find_objects, label
 from mpgrasp.bench.processes import die_with_parent
 from mpgrasp.bench.report.terminal import wide_console
@@ -37,8 +37,8 @@ _context = multiprocessing.get_context("spawn")
 
 def take_objects(
     suite: Suite, words: Sequence[str], *, density: float, workers: int, quiet: bool = False
-) -> tuple[Suite, tuple[Verdict, ...]]:
-    """The suite with meshes in the place of its objects, one per turn, and what came of every mesh.
+) -> tuple[Suite, tuple[MeshVerdict, ...]]:
+    """The suite with meshes in the place of its objects, one per turn, and the verdict on every mesh.
 
     Args:
         suite: of one object at a time.
@@ -71,7 +71,7 @@ def take_objects(
     return taken, verdicts
 
 
-def print_verdicts(verdicts: Sequence[Verdict], console: Console | None = None) -> None:
+def print_verdicts(verdicts: Sequence[MeshVerdict], console: Console | None = None) -> None:
     """Print which meshes are used and, of the others, why not."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
     table.add_column("object", overflow="fold")
@@ -100,7 +100,7 @@ def _spread(qualities: Sequence[float]) -> str:
 
 
 def _shared_scene(suite: Suite) -> SceneConfig:
-    """What the turns of a suite share."""
+    """The scene of a suite's turns, which may differ in their one object."""
     scene = suite.scenes[0]
     one_each = all(len(s.objects) == 1 and s.placing == "scatter" for s in suite.scenes)
     alike = all(replace(s, objects=scene.objects) == scene for s in suite.scenes)
@@ -115,14 +115,14 @@ def _shared_scene(suite: Suite) -> SceneConfig:
 
 def _examine_all(
     files: Sequence[ObjectFile], scene: SceneConfig, density: float, workers: int, quiet: bool
-) -> tuple[Verdict, ...]:
+) -> tuple[MeshVerdict, ...]:
     """A verdict on every file, in order."""
     scene = replace(scene, objects=("it",))  # what it has now may be large, and goes to every process
-    verdicts: dict[ObjectFile, Verdict] = {}
+    verdicts: dict[ObjectFile, MeshVerdict] = {}
     fresh = [file for file in files if not is_cached(file, scene, density)]
     with _Progress(len(fresh), quiet=quiet) as progress:
 
-        def take(file: ObjectFile, verdict: Verdict) -> None:
+        def take(file: ObjectFile, verdict: MeshVerdict) -> None:
             verdicts[file] = verdict
             progress.add(verdict)
 
@@ -141,7 +141,7 @@ def _in_processes(
     files: Sequence[ObjectFile],
     arguments: tuple[SceneConfig, float],
     workers: int,
-    sink: Callable[[ObjectFile, Verdict], object],
+    sink: Callable[[ObjectFile, MeshVerdict], object],
 ) -> None:
     """Examine each file in a process of its own, some at a time; verdicts come as they are reached."""
     todo = list(reversed(files))
@@ -173,19 +173,19 @@ class _Job:
         theirs.close()  # or the end of the process would not be the end of the pipe
         self.deadline = time.monotonic() + TIME_LIMIT
 
-    def verdict(self) -> Verdict:
-        """What the process found, or how it ended."""
+    def verdict(self) -> MeshVerdict:
+        """The verdict that the process reached, or one that says how it ended."""
         reason = f"cutting it up takes more than {TIME_LIMIT:g} s"
         try:
             if self.connection.poll():
-                found: Verdict = self.connection.recv()
+                found: MeshVerdict = self.connection.recv()
                 return found
         except (EOFError, OSError):
             self._process.join()
             reason = f"its process crashed with exit code {self._process.exitcode}"
         finally:
             self.end()
-        return Verdict(
+        return MeshVerdict(
             name=self.file.name, path=str(self.file.path), sha256=sha256(self.file.path), reason=reason
         )
 
@@ -224,7 +224,7 @@ class _Progress:
         if self._bar:
             self._bar.stop()
 
-    def add(self, verdict: Verdict) -> None:
+    def add(self, verdict: MeshVerdict) -> None:
         self._done += 1
         if self._bar:
             self._bar.update(self._task, completed=self._done, description=f"objects: {verdict.name}")

@@ -53,7 +53,7 @@ def make_crew(
     player: Player | None = None,
     hang_after: float | None = None,
 ) -> Crew:
-    """Who plays a plan.
+    """The crew that plays a plan.
 
     Args:
         plan: what is played.
@@ -73,23 +73,6 @@ def make_crew(
     if workers:
         return WorkerPool(plan, workers, run_episode, hang_after=hang_after, attempts=ATTEMPTS)
     return _ThisProcess(plan, run_episode, player)
-
-
-def play_all(
-    plan: Plan,
-    sink: Sink,
-    *,
-    workers: int = 0,
-    run_episode: Games | None = None,
-    hang_after: float | None = None,
-    note: Note = lambda _: None,
-) -> None:
-    """Play a plan's first batch with a crew of its own; see `make_crew` and `Crew.play`."""
-    crew = make_crew(plan, workers, run_episode=run_episode, hang_after=hang_after)
-    try:
-        crew.play(plan.tasks(), sink, note)
-    finally:
-        crew.close()
 
 
 class _ThisProcess:

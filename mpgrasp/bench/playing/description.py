@@ -1,113 +1,130 @@
-"""Content of run.json: all that decides a run's results, and what they were made with."""
+"""Describes a run for its run.json: all that decides its results, and what they are made with."""
 
 from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import Player
 from mpgrasp.bench.playing.recorded_command import PROGRAM
-from mpgrasp.files.json_values import plain
+from mpgrasp.bench.record import record_of
+from mpgrasp.bench.results.run_card import (
+    Card,
+    Configuration,
+    ControllerCard,
+    DetectorCard,
+    RunDescription,
+    SuiteCard,
+    SuitePart,
+)
+from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.files.json_values import json_value
 from mpgrasp.suite import Suite
 
 
-def describe(plan: Plan, player: Player, command: Sequence[str]) -> dict[str, Any]:
-    """Content of run.json; its `configuration` is what two runs in one folder must agree in.
+def describe(plan: Plan, player: Player, command: Sequence[str]) -> RunDescription:
+    """Content of run.json.
 
-    The world card of the first suite stands at the top; those of several stand by name in `worlds`.
+    Raises:
+        MpgraspError: an object, an arena or a camera backend that cannot be used.
     """
     from mpgrasp.bench.playing.world_card import world_card
     from mpgrasp.bench.results.provenance import provenance
 
-    cards = [world_card(suite, player.episode_configs[suite.name], plan.seed) for suite in plan.suites]
-    several = len(cards) > 1
-    return {
-        "format": 1,
-        "command": shlex.join([*PROGRAM, *command]),
-        "started": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "configuration": configuration(plan, player),
-        **cards[0],
-        **({"worlds": {s.name: card for s, card in zip(plan.suites, cards, strict=True)}} if several else {}),
-        **(
-            {"objects": [_without_folder(verdict.card()) for verdict in plan.objects]} if plan.objects else {}
-        ),
-        "made_with": provenance(),
+    worlds = {
+        suite.name: world_card(suite, player.episode_configs[suite.name], plan.seed) for suite in plan.suites
     }
+    first = worlds[plan.suites[0].name]
+    return RunDescription(
+        format=1,
+        command=shlex.join([*PROGRAM, *command]),
+        started=datetime.now().astimezone().isoformat(timespec="seconds"),
+        configuration=configuration(plan, player),
+        physics=first.physics,
+        camera=first.camera,
+        motion=first.motion,
+        ik=first.ik,
+        reflex=first.reflex,
+        worlds=worlds if len(worlds) > 1 else {},
+        objects=tuple(verdict.card() for verdict in plan.objects),
+        made_with=provenance(),
+    )
 
 
-def configuration(plan: Plan, player: Player) -> dict[str, Any]:
+def configuration(plan: Plan, player: Player) -> Configuration:
     """All that decides what a run's lines say; of a programme, `suite` is the name and `suites` says more.
 
     Files are given by name and hash: where they lie decides nothing, and is nobody's business.
     """
+    parts = tuple(
+        SuitePart(
+            suite=suite_card(suite),
+            episode=json_value(player.episode_configs[suite.name]),
+            episodes=plan.batch(suite),
+        )
+        for suite in plan.suites
+    )
+    alone = plan.programme is None
+    return Configuration(
+        suite=plan.programme or parts[0].suite,
+        suites=() if alone else parts,
+        episode=parts[0].episode if alone else None,
+        episodes=parts[0].episodes if alone else None,
+        cells=tuple(str(method) for method in plan.methods),
+        detectors=tuple(_detector_card(plan, name, item) for name, item in player.detectors.items()),
+        controllers=tuple(
+            ControllerCard(name=name, config=json_value(getattr(controller, "config", None)))
+            for name, controller in player.controllers.items()
+        ),
+        until_ci=plan.until_ci,
+        max_episodes=None if plan.until_ci is None else plan.max_episodes,
+        seed=plan.seed,
+        camera=plan.camera,
+        noise=plan.noise,
+    )
+
+
+def _detector_card(plan: Plan, name: str, detector: GraspDetector) -> DetectorCard:
     from mpgrasp.bench.results.provenance import sha256
     from mpgrasp.detectors.detector import reads_truth
     from mpgrasp.paths import WEIGHTS
 
-    suites = [
-        {
-            "suite": suite_card(suite),
-            "episode": player.episode_configs[suite.name],
-            "episodes": plan.batch(suite),
-        }
-        for suite in plan.suites
-    ]
-    return {
-        **(suites[0] if plan.programme is None else {"suite": plan.programme, "suites": suites}),
-        "cells": ["/".join(cell) for cell in plan.cells],
-        "detectors": [
-            {
-                "name": name,
-                "weights": given.name if (given := plan.weights.get(name)) else None,
-                # of the shipped weights where none are given; a plug-in's own are its own affair
-                "sha256": sha256(given or WEIGHTS / f"{name}.safetensors"),
-                "reads_truth": reads_truth(detector),
-                "device": getattr(detector, "device", None),
-                "runtime": getattr(detector, "runtime", None),
-                "config": getattr(detector, "config", None),
-            }
-            for name, detector in player.detectors.items()
-        ],
-        "controllers": [
-            {"name": name, "config": getattr(controller, "config", None)}
-            for name, controller in player.controllers.items()
-        ],
-        "until_ci": plan.until_ci,
-        "max_episodes": None if plan.until_ci is None else plan.max_episodes,
-        "seed": plan.seed,
-        "camera": plan.camera,
-        "noise": plan.noise,
-    }
+    given = plan.weights.get(name)
+    return DetectorCard(
+        name=name,
+        weights=None if given is None else given.name,
+        # of the shipped weights where none are given; a plug-in's own are its own affair
+        sha256=sha256(given or WEIGHTS / f"{name}.safetensors"),
+        reads_truth=reads_truth(detector),
+        device=json_value(getattr(detector, "device", None)),
+        runtime=json_value(getattr(detector, "runtime", None)),
+        config=json_value(getattr(detector, "config", None)),
+    )
 
 
-def suite_card(suite: Suite) -> dict[str, Any]:
+def suite_card(suite: Suite) -> SuiteCard:
     """A suite as plain values; an object's mesh is given by the hash of its pieces."""
     # names in place of meshes, whose vertices would fill pages
     named = (
         replace(s, objects=tuple(getattr(item, "name", item) for item in s.objects)) for s in suite.scenes
     )
-    card: dict[str, Any] = plain(replace(suite, scenes=tuple(named)))
+    card: Card = json_value(replace(suite, scenes=tuple(named)))
     for scene, written in zip(suite.scenes, card["scenes"], strict=True):
         written["objects"] = [_object_card(item) for item in scene.objects]
-    return card
+    return record_of(SuiteCard, card)
 
 
 def _object_card(item: Any) -> Any:
     meshes = [part.vertices for part in getattr(item, "parts", ()) if part.vertices is not None]
     if not meshes:
-        return plain(item)
+        return json_value(item)
     digest = hashlib.sha256()
     for vertices in meshes:
         digest.update(vertices.tobytes())
-    card: dict[str, Any] = plain(replace(item, parts=item.parts[:1]))
+    card: Card = json_value(replace(item, parts=item.parts[:1]))
     return {**card, "parts": {"pieces": len(item.parts), "sha256": digest.hexdigest()}}
-
-
-def _without_folder(card: Mapping[str, Any]) -> dict[str, Any]:
-    return {**card, "file": Path(card["file"]).name}

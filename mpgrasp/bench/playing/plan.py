@@ -1,4 +1,4 @@
-"""What a run is asked to do: suites, cells (detector, controller) and how many episodes of each."""
+"""Plan of a run: suites, methods (detector and controller) and how many episodes of each."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mpgrasp.bench.record import Cell, Task
+from mpgrasp.bench.record import Method, Task
+from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.suite import Suite
 
 if TYPE_CHECKING:
-    from mpgrasp.bench.meshes.check import Verdict
-
-CAMERA_BACKENDS = ("auto", "gl", "ray")
+    from mpgrasp.bench.meshes.check import MeshVerdict
 
 
-def every_cell(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Cell, ...]:
+def every_method(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Method, ...]:
     """Every detector with every controller.
 
     Raises:
@@ -27,7 +26,7 @@ def every_cell(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Ce
     for kind, names in (("detector", detectors), ("controller", controllers)):
         if not names or not all(names) or len(set(names)) < len(names):
             raise ConfigError(f"unusable list of {kind}s", got=",".join(names), allowed=f"different {kind}s")
-    return tuple(Cell(detector, controller) for detector in detectors for controller in controllers)
+    return tuple(Method(detector, controller) for detector in detectors for controller in controllers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,17 +34,17 @@ class Plan:
     """All that decides what a run does."""
 
     suites: tuple[Suite, ...]
-    """Played one after the other, by the same cells."""
+    """Played one after the other, by the same methods."""
     programme: str | None = None
     """Name of what the suites are played for, where it is more than one suite."""
-    cells: tuple[Cell, ...] = (Cell("dhrnet", "mppc"),)
+    methods: tuple[Method, ...] = (Method("dhrnet", "mppc"),)
     """In the order of their turns."""
     weights: Mapping[str, Path] = field(default_factory=dict)
     """Weights files by detector; the others take what ships with mpgrasp."""
     runtime: str = "auto"
-    """What computes the networks: auto, torch or openvino."""
-    objects: tuple[Verdict, ...] = ()
-    """What came of every mesh that was to take the place of the suite's objects."""
+    """Engine that computes the networks: auto, torch or openvino."""
+    objects: tuple[MeshVerdict, ...] = ()
+    """The verdict on every mesh that was to take the place of the suite's objects."""
     episodes: int | None = None
     """Episodes of each cell in each suite, with `until_ci` the size of a batch; None: as a suite declares."""
     until_ci: float | None = None
@@ -56,7 +55,7 @@ class Plan:
     camera: str = "auto"
     """Camera backend: auto, gl (rasterised) or ray (ray-cast, needs no OpenGL)."""
     noise: bool = True
-    """Whether the depth camera is as noisy as a real one."""
+    """True if the depth camera is as noisy as a real one."""
     record: int = 0
     """Number of episodes of each cell that are recorded, the first ones."""
     recordings: Path | None = None
@@ -78,7 +77,7 @@ class Plan:
         if self.until_ci is not None and self.max_episodes < batch:
             raise ConfigError("max-episodes out of range", got=self.max_episodes, allowed=f"{batch} or more")
         for name, choice, allowed in (
-            ("camera backend", self.camera, CAMERA_BACKENDS), ("runtime", self.runtime, RUNTIMES),
+            ("camera backend", self.camera, BACKENDS), ("runtime", self.runtime, RUNTIMES),
         ):  # fmt: skip
             if choice not in allowed:
                 raise ConfigError(f"unknown {name}", got=choice, allowed=allowed)
@@ -91,12 +90,12 @@ class Plan:
     @property
     def detectors(self) -> tuple[str, ...]:
         """Names of all detectors that play."""
-        return tuple(dict.fromkeys(cell.detector for cell in self.cells))
+        return tuple(dict.fromkeys(method.detector for method in self.methods))
 
     @property
     def controllers(self) -> tuple[str, ...]:
         """Names of all controllers that play."""
-        return tuple(dict.fromkeys(cell.controller for cell in self.cells))
+        return tuple(dict.fromkeys(method.controller for method in self.methods))
 
     def suite(self, name: str) -> Suite:
         """The suite of that name, which must be one of the plan's."""
@@ -107,28 +106,25 @@ class Plan:
         return suite.trials if self.episodes is None else self.episodes
 
     def place(self, task: Task) -> tuple[int, ...]:
-        """Where a task stands in the order of the plan: of two tasks, the one with the lesser place is first.
+        """Place of a task in the order of the plan: of two tasks, the one with the lesser place is first.
 
         What the plan does not have comes after everything that it has.
         """
-        suites, cells = [suite.name for suite in self.suites], self.cells
-        cell = Cell(task.detector, task.controller)
-        if task.suite not in suites or cell not in cells:
+        suites, method = [suite.name for suite in self.suites], task.cell.method
+        if task.suite not in suites or method not in self.methods:
             return (len(suites),)
-        return suites.index(task.suite), task.episode, cells.index(cell)
+        return suites.index(task.suite), task.episode, self.methods.index(method)
 
     def tasks(self) -> list[Task]:
         """A batch of every suite, in order."""
         return [task for suite in self.suites for task in self.tasks_of(suite, 0, self.batch(suite))]
 
     def tasks_of(self, suite: Suite, start: int, stop: int) -> list[Task]:
-        """Every episode of a suite from `start` to before `stop`, of every cell, in order.
+        """Every episode of a suite from `start` to before `stop`, of every method, in order.
 
-        Episode by episode, every cell plays in turn, so that a run that is stopped half-way still
-        compares its cells over the same episodes.
+        Episode by episode, every method plays in turn, so that a run that is stopped half-way still
+        compares its methods over the same episodes.
         """
         return [
-            Task(suite=suite.name, episode=episode, detector=cell.detector, controller=cell.controller)
-            for episode in range(start, stop)
-            for cell in self.cells
+            Task(suite.name, episode, *method) for episode in range(start, stop) for method in self.methods
         ]

@@ -1,4 +1,4 @@
-"""Plays one episode of a plan at a time and says in a line what came of it."""
+"""Plays one episode of a plan at a time and returns its line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.trace_recorder import TraceRecorder
-from mpgrasp.bench.record import ERROR, Line, Task
+from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
 from mpgrasp.plugins import load_controller, load_detector
@@ -18,7 +18,7 @@ RunEpisode = Callable[..., Any]
 """Called like `mpgrasp.episode.episode.run_episode`; returns what has `as_record()`."""
 
 Games = RunEpisode | Mapping[str, RunEpisode]
-"""What plays an episode, for all trials or by trial."""
+"""Functions that play an episode, one for all trials or one by trial."""
 
 
 class EpisodeError(MpgraspError):
@@ -58,7 +58,7 @@ class Player:
                 )
         return [line for line in map(prepare, self.detectors.values()) if line]
 
-    def play(self, task: Task) -> Line:
+    def play(self, task: Task) -> PlayedLine:
         """The line of one episode, to go to episodes.jsonl.
 
         Raises:
@@ -76,18 +76,19 @@ class Player:
                 config=self.episode_configs[suite.name],
                 recorder=self._recorder(task, trace),
             )
-            record = result.as_record()
+            line = line_of({**result.as_record(), **_which(self.plan, task)})
+            assert not isinstance(line, ErrorLine), "no episode ends with the outcome of an error row"
             if trace is not None:
-                trace.save(record)
+                trace.save(line)
         except OutputError:
             raise
         except Exception as error:
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
-        return {**record, **_which(self.plan, task)}
+        return line
 
     def _trace(self, task: Task) -> TraceRecorder | None:
         folder = self.plan.traces
-        return None if folder is None else TraceRecorder(folder, task.stem, self.plan.camera)
+        return None if folder is None else TraceRecorder(folder, self.plan.camera)
 
     def _recorder(self, task: Task, trace: TraceRecorder | None) -> Recorder:
         if self.plan.recordings is None or task.episode >= self.plan.record:
@@ -102,7 +103,7 @@ class Player:
         return TeeRecorder(*recorders)
 
 
-def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> Line:
+def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> ErrorLine:
     """The line of an episode that could not be played.
 
     Args:
@@ -111,13 +112,7 @@ def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> L
         troubles: one (what went wrong, traceback) per attempt.
     """
     reports = [f"attempt {k}: {what}\n\n{trace}" for k, (what, trace) in enumerate(troubles, 1)]
-    return {
-        "outcome": ERROR,
-        "success": None,
-        "error": troubles[-1][0],
-        "traceback": "\n".join(reports),
-        **_which(plan, task),
-    }
+    return ErrorLine(error=troubles[-1][0], traceback="\n".join(reports), **_which(plan, task))
 
 
 def real_games() -> Games:
@@ -128,7 +123,7 @@ def real_games() -> Games:
     return {"grasp": run_episode, "clear": run_clearing}
 
 
-def _which(plan: Plan, task: Task) -> Line:
+def _which(plan: Plan, task: Task) -> dict[str, Any]:
     return {
         "suite": task.suite,
         "seed": plan.seed,

@@ -1,34 +1,34 @@
-"""Programmes: several suites in one run, each cell playing all of them, such as all trials of the paper."""
+"""Programmes: several suites in one run, each method playing all of them, such as all trials of the paper."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mpgrasp.bench.playing.plan import every_cell
-from mpgrasp.bench.record import Cell
+from mpgrasp.bench.playing.plan import every_method
+from mpgrasp.bench.record import Method
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.suite import Suite, load_suite, suite_names
 
 
 @dataclass(frozen=True, kw_only=True)
 class Programme:
-    """What stands on the command line in the place of one suite."""
+    """Several suites under one name, which stands on the command line in the place of one suite."""
 
     title: str
     suites: tuple[str, ...]
     """In the order in which they are played, each with as many episodes as it declares."""
     detectors: tuple[str, ...]
     controllers: tuple[str, ...]
-    references: tuple[Cell, ...]
+    references: tuple[Method, ...]
     """Played beside every detector with every controller, unless the command line names others."""
 
-    def cells(
+    def methods(
         self, detectors: Sequence[str] | None = None, controllers: Sequence[str] | None = None
-    ) -> tuple[Cell, ...]:
-        """Who plays; if detectors or controllers are given, they replace all of the programme's."""
-        cells = every_cell(detectors or self.detectors, controllers or self.controllers)
-        return cells if detectors or controllers else (*cells, *self.references)
+    ) -> tuple[Method, ...]:
+        """The methods that play; detectors or controllers that are given replace all of the programme's."""
+        methods = every_method(detectors or self.detectors, controllers or self.controllers)
+        return methods if detectors or controllers else (*methods, *self.references)
 
 
 PROGRAMMES: dict[str, Programme] = {
@@ -38,7 +38,7 @@ PROGRAMMES: dict[str, Programme] = {
         detectors=("ggcnn2", "tfgrasp", "dhrnet"),
         controllers=("mvp", "mppc"),
         # the ceiling, and the floor: one look and no closed loop
-        references=(Cell("oracle", "mppc"), Cell("dhrnet", "open_loop")),
+        references=(Method("oracle", "mppc"), Method("dhrnet", "open_loop")),
     ),
 }
 """Programmes by name."""

@@ -10,14 +10,14 @@ import shlex
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from mpgrasp.bench.meshes.files import YCB
 from mpgrasp.bench.results.reader import read_run
+from mpgrasp.bench.results.run_card import RunDescription
 from mpgrasp.exceptions import ConfigError, OutputError
 
 PROGRAM = ("python", "-m", "mpgrasp.bench")
-"""What a recorded command begins with."""
+"""First words of a recorded command."""
 
 
 def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str] = ()) -> Namespace:
@@ -47,11 +47,11 @@ def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str]
     return arguments
 
 
-def _command_of(run: dict[str, Any], folder: Path) -> list[str]:
-    """Arguments of the command that a run.json says it was made with."""
+def _command_of(run: RunDescription, folder: Path) -> list[str]:
+    """Arguments of the command that a run was made with."""
     try:
-        words = shlex.split(run["command"])
-    except (KeyError, ValueError, AttributeError) as error:
+        words = shlex.split(run.command)
+    except ValueError as error:
         raise _no_command(folder) from error
     return words[len(PROGRAM) :]
 

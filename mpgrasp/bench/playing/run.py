@@ -9,15 +9,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mpgrasp.bench.analysis.summary import paired_tests, summarise
+from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.playing.crew import Crew, make_crew
 from mpgrasp.bench.playing.description import describe
-from mpgrasp.bench.playing.plan import Plan, every_cell
+from mpgrasp.bench.playing.plan import Plan, every_method
 from mpgrasp.bench.playing.player import EpisodeError, Player
 from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.processes import interrupts_wait
-from mpgrasp.bench.record import ERROR, Line, Task
-from mpgrasp.bench.report.terminal import ProgressReport, print_table, print_tests
+from mpgrasp.bench.record import Line, Task, played
+from mpgrasp.bench.report.terminal import RunProgress, print_table, print_tests
 from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
@@ -26,11 +26,11 @@ from mpgrasp.plugins import check_name, controller_names, detector_names, parse_
 from mpgrasp.suite import Suite
 
 if TYPE_CHECKING:
-    from mpgrasp.bench.meshes.check import Verdict
+    from mpgrasp.bench.meshes.check import MeshVerdict
 
 EXIT_BROKEN = 1
 DETECTOR, CONTROLLER = "dhrnet", "mppc"
-"""Who plays a suite unless told otherwise."""
+"""The method that plays a suite unless told otherwise."""
 
 
 def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
@@ -50,9 +50,9 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     only = None if arguments.suites is None else tuple(arguments.suites.split(","))
     suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
     if programme is None:
-        cells = every_cell(detectors or (DETECTOR,), controllers or (CONTROLLER,))
+        methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
     else:
-        cells = programme.cells(detectors, controllers)
+        methods = programme.methods(detectors, controllers)
     suites, objects = _with_objects(suites, arguments)
     name = suites[0].name if programme is None else arguments.suite
     out = arguments.out or Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -60,8 +60,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         suites=suites,
         objects=objects,
         programme=None if programme is None else name,
-        cells=cells,
-        weights=parse_weights(arguments.weights, list(dict.fromkeys(cell.detector for cell in cells))),
+        methods=methods,
+        weights=parse_weights(arguments.weights, list(dict.fromkeys(m.detector for m in methods))),
         runtime=arguments.runtime,
         episodes=arguments.episodes,
         until_ci=arguments.until_ci,
@@ -78,8 +78,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
 
 def _with_objects(
     suites: tuple[Suite, ...], arguments: argparse.Namespace
-) -> tuple[tuple[Suite, ...], tuple[Verdict, ...]]:
-    """The suites with the objects that the command line brings, if any, and what came of every mesh."""
+) -> tuple[tuple[Suite, ...], tuple[MeshVerdict, ...]]:
+    """The suites with the objects that the command line brings, if any, and the verdict on every mesh."""
     if not arguments.objects:
         return suites, ()
     if len(suites) > 1:
@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
 
         print_verdicts(plan.objects)
     content = describe(plan, player, command)
-    with ProgressReport(quiet=arguments.quiet) as progress:
+    with RunProgress(quiet=arguments.quiet) as progress:
         for line in ready:
             progress.note(line)
         if arguments.resume:
@@ -146,7 +146,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         return _conclude(plan, directory, finished) or code
 
 
-def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: ProgressReport) -> bool:
+def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: RunProgress) -> bool:
     """Play what is missing; True once nothing is.
 
     Batches are fixed, and whether another follows depends on the lines of the batches before alone: not
@@ -154,26 +154,26 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Pro
     """
     before = directory.episodes()
     progress.start(before)
-    played = {Task.of(line) for line in before if line["outcome"] != ERROR}
+    done = {line.task for line in played(before)}
 
     def sink(line: Line) -> None:
         with interrupts_wait():
-            directory.append(line, Task.of(line).stem)
+            directory.append(line)
             progress.add(line)
 
     def play(tasks: list[Task]) -> None:
-        crew.play([task for task in tasks if task not in played], sink, progress.note)
+        crew.play([task for task in tasks if task not in done], sink, progress.note)
 
     if plan.until_ci is None:
         progress.expect(len(plan.tasks()))
         play(plan.tasks())
         return True
-    done = 0
+    expected = 0
     for suite in plan.suites:
         stop, narrow = 0, False
         while not narrow and stop < plan.max_episodes:
             start, stop = stop, min(stop + plan.batch(suite), plan.max_episodes)
-            progress.expect(done + stop * len(plan.cells))
+            progress.expect(expected + stop * len(plan.methods))
             play(plan.tasks_of(suite, start, stop))
             narrow = _narrow(plan, suite, directory.episodes(), stop)
         if not narrow:
@@ -181,16 +181,16 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Pro
                 f"{plan.max_episodes} episodes of each combination have not brought every interval of "
                 f"{suite.name} below {plan.until_ci:g} points; --max-episodes allows more"
             )
-        done += stop * len(plan.cells)
+        expected += stop * len(plan.methods)
     return True
 
 
 def _narrow(plan: Plan, suite: Suite, lines: Sequence[Line], stop: int) -> bool:
-    """Whether the first `stop` episodes of a suite leave no cell's interval as wide as `until_ci`."""
+    """True if the first `stop` episodes of a suite leave no cell's interval as wide as `until_ci`."""
     assert plan.until_ci is not None
-    cells = summarise(line for line in lines if line["suite"] == suite.name and line["episode"] < stop)
-    widths = [100 * (cell["wilson_high"] - cell["wilson_low"]) for cell in cells]
-    return len(widths) == len(plan.cells) and max(widths) < plan.until_ci
+    cells = summarise(line for line in lines if line.suite == suite.name and line.episode < stop)
+    widths = [100 * (cell.wilson_high - cell.wilson_low) for cell in cells]
+    return len(widths) == len(plan.methods) and max(widths) < plan.until_ci
 
 
 def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
@@ -198,12 +198,14 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
     from mpgrasp.bench.report.build import write_report
 
     code = 0
-    lines = sorted(directory.episodes(), key=lambda line: plan.place(Task.of(line)))
+    lines = sorted(directory.episodes(), key=lambda line: plan.place(line.task))
     cells, tests = summarise(lines), paired_tests(lines)
-    errors = sum(cell["errors"] for cell in cells)
+    errors = sum(cell.errors for cell in cells)
     try:
         directory.settle(lines)
-        directory.write_summary({"complete": finished and not errors, "cells": cells, "paired_tests": tests})
+        directory.write_summary(
+            RunSummary(complete=finished and not errors, cells=tuple(cells), paired_tests=tuple(tests))
+        )
         prune_traces(directory.path / "traces")
         write_report([directory.path], directory.path)
     except OutputError as error:

@@ -7,7 +7,7 @@ the way: postures are remembered, and drawn when the verdict is there, if they a
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpgrasp.bench.record import PlayedLine
 from mpgrasp.bench.results.trace import write_trace
 from mpgrasp.geometry import FloatArray, look_at
 
@@ -38,12 +39,11 @@ class TraceRecorder:
 
     Args:
         folder: of the traces; made if need be.
-        stem: of the file, cell and number of the episode, as in `Task.stem`.
         camera: backend that draws the stills: "gl", "ray" or "auto".
     """
 
-    def __init__(self, folder: Path, stem: str, camera: str = "auto") -> None:
-        self.folder, self.stem, self.camera = folder, stem, camera
+    def __init__(self, folder: Path, camera: str = "auto") -> None:
+        self.folder, self.camera = folder, camera
         self._simulation: Simulation | None = None
         self._start = 0.0
         self._samples: list[tuple[float, float, float, float, float]] = []
@@ -76,17 +76,17 @@ class TraceRecorder:
     def finish(self, event: str) -> None:
         pass
 
-    def save(self, record: Mapping[str, Any]) -> None:
+    def save(self, line: PlayedLine) -> None:
         """Write the way and the stills, each if it is wanted.
 
         Args:
-            record: `EpisodeResult.as_record()`; its `success` and `state_hash` count.
+            line: of the episode.
 
         Raises:
             OutputError: a file cannot be written.
         """
         if self._simulation is not None and self._samples:
-            write_trace(self.folder, self.stem, record, self._way, self._pictures)
+            write_trace(self.folder, line, self._way, self._pictures)
 
     def _remember(self, now: float, quality: NDArray[np.float16] | None) -> None:
         assert self._simulation is not None

@@ -46,7 +46,7 @@ _context = multiprocessing.get_context("spawn")
 
 
 class WorkerPool:
-    """Plays tasks in processes; implements `runner.Crew`."""
+    """Plays tasks in processes; implements `crew.Crew`."""
 
     def __init__(
         self, plan: Plan, size: int, run_episode: Games, *, hang_after: float | None, attempts: int
@@ -193,7 +193,7 @@ def _cause(exitcode: int | None) -> str:
 
 
 def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str) -> None:
-    """What a worker process does until the pipe ends."""
+    """Play what the pipe brings, in a worker process, until the pipe ends."""
     # Ctrl-C reaches the whole process group; the parent decides what becomes of its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=die_with_parent, daemon=True).start()

@@ -2,29 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mpgrasp.bench.analysis.hypotheses import evaluate
-from mpgrasp.bench.analysis.summary import paired_tests, summarise
-from mpgrasp.bench.report.document import Block, Paragraph, Section, to_html, to_markdown
-from mpgrasp.bench.report.gallery import film_blocks, motion_pictures, outcome_pictures, read_traces
-from mpgrasp.bench.report.paper_tables import hypothesis_blocks, pair_table, paper_tables
-from mpgrasp.bench.report.tables import (
-    card_blocks,
-    failure_blocks,
-    motion_table,
-    object_blocks,
-    overview_table,
-    run_blocks,
-    timing_blocks,
+from mpgrasp.bench.report.document import Figure, Table
+from mpgrasp.bench.report.evaluation import Evaluation
+from mpgrasp.bench.report.filmstrips import Films, filmstrips
+from mpgrasp.bench.report.kept_traces import read_traces
+from mpgrasp.bench.report.motion_figures import SuiteMotion, motion_figures
+from mpgrasp.bench.report.orderings import Orderings, orderings, pair_table
+from mpgrasp.bench.report.outcome_figures import outcome_figures
+from mpgrasp.bench.report.paper_tables import PaperTables, paper_tables
+from mpgrasp.bench.report.run_tables import (
+    card_differences,
+    card_tables,
+    configuration_differences,
+    failure_table,
+    run_table,
 )
-from mpgrasp.bench.report.thickness import thickness_blocks
+from mpgrasp.bench.report.tables import (
+    TickTimes,
+    motion_table,
+    object_tables,
+    overview_table,
+    refused_meshes_table,
+    tick_times,
+)
+from mpgrasp.bench.report.thickness import ThinObjects, thin_objects
 from mpgrasp.bench.results.runs import Runs, find_runs
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
 
 FILES = ("report.html", "report.md")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Everything that a report says; the templates lay it out, in the order of `sections.j2`."""
+
+    suites: Sequence[str]
+    counts: str
+    """Numbers of what was played, in a sentence."""
+    overview: Table
+    by_object: Sequence[Table]
+    refused_meshes: Table | None
+    paper: PaperTables
+    orderings: Orderings
+    pairs: Table | None
+    outcomes: Mapping[str, Sequence[Figure]]
+    """Figures by suite; none where nothing could be played."""
+    motion: Table
+    motion_by_suite: Sequence[SuiteMotion]
+    unreadable_traces: Sequence[str]
+    thin_objects: ThinObjects | None
+    ticks: TickTimes | None
+    films: Films
+    failures: Table | None
+    runs: Table
+    commands: Sequence[str]
+    differences: Sequence[str]
+    """Differences of the runs' settings."""
+    card: Sequence[Table]
+    """Physics card of the first run; empty where it has none."""
+    card_differences: Sequence[str]
 
 
 def write_report(folders: Sequence[Path], out: Path) -> Path:
@@ -34,51 +76,54 @@ def write_report(folders: Sequence[Path], out: Path) -> Path:
         OutputError: a run that cannot be read, or a file that cannot be written.
         ConfigError: a cell that two runs have played.
     """
-    title, sections = make_report(find_runs(folders))
-    for name, text in zip(FILES, (to_html(title, sections), to_markdown(title, sections)), strict=True):
+    # loads Jinja, which the command's --help needs not
+    from mpgrasp.bench.report.rendering import to_html, to_markdown
+
+    report = make_report(find_runs(folders))
+    for name, text in zip(FILES, (to_html(report), to_markdown(report)), strict=True):
         _replace(out / name, text)
     return out / FILES[0]
 
 
-def make_report(runs: Runs) -> tuple[str, list[Section]]:
-    """Title and sections of the report, which say the same in HTML and Markdown."""
-    rows = {(row["suite"], row["detector"], row["controller"]): row for row in summarise(runs.lines)}
-    tests = paired_tests(runs.lines)
-    traced, troubles = read_traces(runs)
-    n, errors = sum(row["n"] for row in rows.values()), sum(row["errors"] for row in rows.values())
-    failures = n - sum(row["successes"] for row in rows.values())
-    said = (
-        f"Suites: {len(runs.suites)}, cells: {len(rows)}, episodes: {n}, failures: {failures}, "
+def make_report(runs: Runs) -> Report:
+    """The report on some runs, as text, numbers and figures."""
+    evaluation, kept = Evaluation.of(runs), read_traces(runs)
+    return Report(
+        suites=runs.suites,
+        counts=_counts_text(evaluation),
+        overview=overview_table(evaluation),
+        by_object=object_tables(evaluation),
+        refused_meshes=refused_meshes_table(runs),
+        paper=paper_tables(evaluation),
+        orderings=orderings(evaluate(runs.cells)),
+        pairs=pair_table(evaluation.tests),
+        outcomes={suite: outcome_figures(evaluation, suite) for suite in runs.suites},
+        motion=motion_table(evaluation),
+        motion_by_suite=[motion_figures(evaluation, suite, kept) for suite in runs.suites],
+        unreadable_traces=kept.unreadable,
+        thin_objects=thin_objects(evaluation),
+        ticks=tick_times(runs),
+        films=filmstrips(runs, kept),
+        failures=failure_table(runs),
+        runs=run_table(runs),
+        commands=[run.about.command for run in runs.runs],
+        differences=configuration_differences(runs),
+        card=card_tables(runs),
+        card_differences=card_differences(runs),
+    )
+
+
+def _counts_text(evaluation: Evaluation) -> str:
+    rows, suites = evaluation.summaries.values(), evaluation.runs.suites
+    n, errors = sum(row.n for row in rows), sum(row.errors for row in rows)
+    failures = n - sum(row.successes for row in rows)
+    text = (
+        f"Suites: {len(suites)}, cells: {len(rows)}, episodes: {n}, failures: {failures}, "
         f"episodes that could not be played: {errors}."
     )
-    if any(not run.complete for run in runs.runs):
-        said += " Not all is there yet: a run is not complete."
-    thin = thickness_blocks(runs)
-    pairs: list[Block] = [pair_table(tests)] if tests else [Paragraph(text="No two cells of one suite.")]
-    sections = [
-        Section(
-            title="Results", blocks=[Paragraph(text=said), overview_table(rows), *object_blocks(runs, rows)]
-        ),
-        Section(title="The paper's tables", blocks=paper_tables(runs, rows, tests)),
-        Section(title="The paper's orderings", blocks=hypothesis_blocks(evaluate(runs.cells))),
-        Section(title="Paired tests", blocks=pairs),
-        Section(title="Success and time", blocks=outcome_pictures(runs, rows)),
-        Section(
-            title="How the arm moved",
-            blocks=[
-                motion_table(rows),
-                *(Paragraph(text=f"A trace cannot be read: {trouble}") for trouble in troubles),
-                *motion_pictures(runs, traced),
-            ],
-        ),
-        *([Section(title="Thin objects", blocks=thin)] if thin else []),
-        Section(title="Where the time goes", blocks=timing_blocks(runs)),
-        Section(title="Filmstrips", blocks=film_blocks(runs, traced)),
-        Section(title="Failures", blocks=failure_blocks(runs)),
-        Section(title="Runs", blocks=run_blocks(runs)),
-        Section(title="Physics card", blocks=card_blocks(runs)),
-    ]
-    return f"mpgrasp: {', '.join(runs.suites) or 'no episodes'}", sections
+    if not all(run.complete for run in evaluation.runs.runs):
+        text += " Not all is there yet: a run is not complete."
+    return text
 
 
 def _replace(file: Path, text: str) -> None:

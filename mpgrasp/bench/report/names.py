@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mpgrasp.bench.record import Method
+
 _NAMES = {
     "dhrnet": "DHRNet", "tfgrasp": "TF-Grasp", "ggcnn": "GG-CNN", "ggcnn2": "GG-CNN2", "fcn": "FCN",
     "fcn_residual": "FCN with residuals", "unet": "U-Net", "oracle": "oracle",
@@ -9,6 +11,6 @@ _NAMES = {
 }  # fmt: skip
 
 
-def name_of(detector: str, controller: str) -> str:
-    """A cell in words, without its suite."""
-    return f"{_NAMES.get(detector, detector)} + {_NAMES.get(controller, controller)}"
+def name_of(method: Method) -> str:
+    """A detector and a controller in words."""
+    return " + ".join(_NAMES.get(name, name) for name in method)

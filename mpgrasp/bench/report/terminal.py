@@ -1,12 +1,10 @@
-"""What the user sees of a run: progress while it lasts, and the table in the end."""
+"""Output of a run on the terminal: progress while it lasts, and the table of its results in the end."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -20,19 +18,20 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from mpgrasp.bench.record import ERROR
+from mpgrasp.bench.analysis.summary import CellSummary, ClearingCounts, PairedTest
+from mpgrasp.bench.record import ErrorLine, Line, played
 from mpgrasp.statistics import SIGNIFICANCE
 
 PIPED_WIDTH = 160
 """Columns of a table that goes into a file or a pipe."""
 
 
-def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
+def result_table(cells: Sequence[CellSummary]) -> Table:
     """The table of a run from rows of `summary.summarise`."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True, header_style="bold")
     for heading in ("suite", "detector", "controller"):
         table.add_column(heading, overflow="fold", vertical="top")
-    errors = any(cell["errors"] for cell in cells)
+    errors = any(cell.errors for cell in cells)
     headings = (
         "n",
         "success",
@@ -45,26 +44,26 @@ def result_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     for heading in (*headings, *(["errors"] if errors else [])):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("failures")
-    clearing = any(cell["clearing"] for cell in cells)
+    clearing = any(cell.clearing for cell in cells)
     if clearing:
         for heading in ("picks", "knocked\noff", "left"):
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("failed picks")
     for cell in cells:
         table.add_row(
-            cell["suite"],
-            cell["detector"],
-            cell["controller"],
-            str(cell["n"]),
-            str(cell["successes"]),
-            _number(cell["rate"] and 100 * cell["rate"]),
-            f"{100 * cell['wilson_low']:.1f}-{100 * cell['wilson_high']:.1f}",
-            _number(cell["median_time_s"]),
-            _with_interval(cell["mean_time_s"], cell["mean_time_low"], cell["mean_time_high"]),
-            str(cell["reflex_stops"]),
-            *([str(cell["errors"])] if errors else []),
-            _causes(cell["failures"]),
-            *(_clearing(cell["clearing"]) if clearing else []),
+            cell.suite,
+            cell.detector,
+            cell.controller,
+            str(cell.n),
+            str(cell.successes),
+            _number(cell.rate and 100 * cell.rate),
+            f"{100 * cell.wilson_low:.1f}-{100 * cell.wilson_high:.1f}",
+            _number(cell.median_time_s),
+            _with_interval(cell.mean_time_s, cell.mean_time_low, cell.mean_time_high),
+            str(cell.reflex_stops),
+            *([str(cell.errors)] if errors else []),
+            _causes(cell.failures),
+            *(_clearing(cell.clearing) if clearing else []),
         )
     return table
 
@@ -74,28 +73,27 @@ def _causes(counts: Mapping[str, int]) -> str:
     return " ".join(f"{outcome}:{count}" for outcome, count in counts.items()) or "none"
 
 
-def _clearing(row: Mapping[str, Any] | None) -> list[str]:
+def _clearing(row: ClearingCounts | None) -> list[str]:
     if row is None:
         return ["-"] * 4
-    numbers = [str(row[key]) for key in ("attempts", "knocked_off", "left")]
-    return [*numbers, _causes(row["failed_attempts"])]
+    return [str(row.attempts), str(row.knocked_off), str(row.left), _causes(row.failed_attempts)]
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None or math.isnan(value) else f"{value:.1f}"
+    return "-" if value is None else f"{value:.1f}"
 
 
-def _with_interval(value: float, low: float, high: float) -> str:
-    bounds = "" if math.isnan(low) else f" ({low:.1f}-{high:.1f})"
+def _with_interval(value: float | None, low: float | None, high: float | None) -> str:
+    bounds = "" if low is None else f" ({low:.1f}-{high:.1f})"
     return _number(value) + bounds
 
 
-def print_table(cells: Sequence[Mapping[str, Any]], console: Console | None = None) -> None:
+def print_table(cells: Sequence[CellSummary], console: Console | None = None) -> None:
     """Print the table of a run, wide enough for pipes and files too."""
     wide_console(console).print(result_table(cells) if cells else "No episode was finished.")
 
 
-def print_tests(tests: Sequence[Mapping[str, Any]], console: Console | None = None) -> None:
+def print_tests(tests: Sequence[PairedTest], console: Console | None = None) -> None:
     """Print the paired tests of `summary.paired_tests` under the table, if there are any."""
     if not tests:
         return
@@ -106,14 +104,14 @@ def print_tests(tests: Sequence[Mapping[str, Any]], console: Console | None = No
         table.add_column(heading, justify="right", no_wrap=True)
     for test in tests:
         table.add_row(
-            test["suite"],
-            " ".join(test["a"]),
-            " ".join(test["b"]),
-            str(test["n"]),
-            str(test["a_alone"]),
-            str(test["b_alone"]),
-            f"{test['p']:.3g}",
-            f"{test['p_holm']:.3g}" + (" *" if test["p_holm"] < SIGNIFICANCE else ""),
+            test.suite,
+            " ".join(test.a),
+            " ".join(test.b),
+            str(test.n),
+            str(test.a_alone),
+            str(test.b_alone),
+            f"{test.p:.3g}",
+            f"{test.p_holm:.3g}" + (" *" if test.p_holm < SIGNIFICANCE else ""),
         )
     wide_console(console).print(table)
 
@@ -124,7 +122,7 @@ def wide_console(console: Console | None = None) -> Console:
     return console if console.is_terminal else Console(file=console.file, width=PIPED_WIDTH)
 
 
-class ProgressReport:
+class RunProgress:
     """A progress bar on a terminal, one line per episode elsewhere, nothing if quiet.
 
     Args:
@@ -150,7 +148,7 @@ class ProgressReport:
             )
             self._task = self._bar.add_task("grasping", total=None, successes=0)
 
-    def __enter__(self) -> ProgressReport:
+    def __enter__(self) -> RunProgress:
         if self._bar:
             self._bar.start()
         return self
@@ -164,16 +162,16 @@ class ProgressReport:
         if self._bar:
             self._bar.stop()
 
-    def start(self, finished: Sequence[Mapping[str, Any]]) -> None:
+    def start(self, finished: Sequence[Line]) -> None:
         """These episodes were finished in an earlier part of the run; the clock starts now."""
-        played = [line for line in finished if line["outcome"] != ERROR]
-        self._before = self._done = len(played)
-        self._successes = sum(bool(line["success"]) for line in played)
+        before = played(finished)
+        self._before = self._done = len(before)
+        self._successes = sum(line.success for line in before)
         self._start = time.monotonic()
         if self._bar:
             self._bar.reset(self._task, completed=self._done, successes=self._successes)
-        elif played and not self._quiet:
-            self.note(f"{len(played)} episodes are there already")
+        elif before and not self._quiet:
+            self.note(f"{len(before)} episodes are there already")
 
     def expect(self, total: int) -> None:
         """There will be so many episodes in all."""
@@ -185,20 +183,20 @@ class ProgressReport:
         """Say something out of the ordinary, even if quiet."""
         self._console.out(f"mpgrasp: {' '.join(text.split())}", highlight=False)
 
-    def add(self, line: Mapping[str, Any]) -> None:
+    def add(self, line: Line) -> None:
         """One more episode is finished."""
         self._done += 1
-        self._successes += bool(line["success"])
+        self._successes += bool(line.success)
         if self._bar:
-            cell = f"{line['suite']} {line['detector']} {line['controller']}"
+            cell = f"{line.suite} {line.detector} {line.controller}"
             self._bar.update(self._task, description=cell, completed=self._done, successes=self._successes)
-        if line["outcome"] == ERROR:
-            self.note(f"error: {line['error']}")
+        if isinstance(line, ErrorLine):
+            self.note(f"error: {line.error}")
         elif not self._bar and not self._quiet:
             text = (
-                f"[{self._done}/{self._total}, {self._time_left()}] {line['suite']} "
-                f"episode {line['episode']}, {line['detector']}, {line['controller']}, {line['object']}: "
-                f"{line['outcome']} in {line['sim_time_s']:.1f} s"
+                f"[{self._done}/{self._total}, {self._time_left()}] {line.suite} "
+                f"episode {line.episode}, {line.detector}, {line.controller}, {line.object}: "
+                f"{line.outcome} in {line.sim_time_s:.1f} s"
             )
             self._console.out(text, highlight=False)
 

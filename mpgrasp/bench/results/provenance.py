@@ -1,4 +1,4 @@
-"""Where a run's numbers come from: versions, machine, commit, weights."""
+"""Provenance of a run's numbers: versions, machine, commit, weights."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import mpgrasp
+from mpgrasp.bench.record import Record
 from mpgrasp.paths import DATA_ROOT
 
 PACKAGES = (
@@ -34,21 +34,44 @@ PACKAGES = (
 """Packages whose version may change a result; those that are not installed are left out."""
 
 
-def provenance() -> dict[str, Any]:
+class GitState(Record, frozen=True, kw_only=True):
+    """State of the checkout that a program runs from."""
+
+    commit: str
+    modified: bool
+    """True if files under version control differ from the commit."""
+
+
+class MadeWith(Record, frozen=True, kw_only=True):
+    """Versions and machine that results were made with."""
+
+    mpgrasp: str
+    git: GitState | None
+    """None outside of a checkout."""
+    python: str
+    platform: str
+    machine: str
+    packages: dict[str, str]
+    """Versions of those of `PACKAGES` that are installed."""
+    threads: dict[str, int | str]
+    """Threads that a process computes on, by who decides it."""
+
+
+def provenance() -> MadeWith:
     """Versions of mpgrasp, Python, packages and system, the commit of a checkout, and threads."""
-    return {
-        "mpgrasp": mpgrasp.__version__,
-        "git": git_state(),
-        "python": platform.python_version(),
-        "platform": platform.system(),
-        "machine": platform.machine(),
-        "packages": {name: version for name in PACKAGES if (version := _version(name))},
-        "threads": threads(),
-    }
+    return MadeWith(
+        mpgrasp=mpgrasp.__version__,
+        git=git_state(),
+        python=platform.python_version(),
+        platform=platform.system(),
+        machine=platform.machine(),
+        packages={name: version for name in PACKAGES if (version := _version(name))},
+        threads=threads(),
+    )
 
 
 def threads() -> dict[str, int | str]:
-    """How many threads a process computes on: what the environment asks for, and what torch makes of it.
+    """Threads that a process computes on: what the environment asks for, and what torch makes of it.
 
     `torch` (OpenVINO gets as many) is there where torch is in use, `OMP_NUM_THREADS` where it is set.
     """
@@ -60,13 +83,13 @@ def threads() -> dict[str, int | str]:
     return found
 
 
-def git_state() -> dict[str, Any] | None:
+def git_state() -> GitState | None:
     """Commit of the checkout that is running and whether files differ from it; None outside of one."""
     if not (DATA_ROOT / ".git").exists():
         return None
     commit = _git("rev-parse", "HEAD")
     changes = _git("status", "--porcelain", "--untracked-files=no")
-    return None if commit is None else {"commit": commit, "modified": bool(changes)}
+    return None if commit is None else GitState(commit=commit, modified=bool(changes))
 
 
 def sha256(file: Path) -> str | None:

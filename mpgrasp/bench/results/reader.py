@@ -8,64 +8,81 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpgrasp.bench.record import ERROR, Task
-from mpgrasp.exceptions import OutputError
+from mpgrasp.bench.analysis.summary import RunSummary
+from mpgrasp.bench.record import Line, Row, line_of, record_of
+from mpgrasp.bench.results.run_card import RunDescription
+from mpgrasp.exceptions import ConfigError, OutputError
 
 RUN, EPISODES, SUMMARY = "run.json", "episodes.jsonl", "summary.json"
-
-ALWAYS = (*Task._fields, "seed", "scene_seed", "outcome", "success")
-"""Keys of every line."""
-PLAYED = ("object", "sim_time_s", "reflex", "state_hash")
-"""Keys that the line of an episode has besides, unless it could not be played."""
-CLEARING = ("failures", "in_basket", "knocked_off", "left")
-"""Keys that a line with `picks` has besides."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lines:
     """Content of an episodes.jsonl."""
 
-    lines: list[dict[str, Any]]
+    lines: list[Line]
     whole: int
     """Bytes up to the end of the last whole line."""
     torn: bytes | None
-    """What stands behind it, if anything."""
+    """Bytes behind it, if there are any."""
 
 
-def read_run(path: Path) -> dict[str, Any]:
-    """Content of run.json.
+def read_run(path: Path) -> RunDescription:
+    """Content of a folder's run.json.
 
     Raises:
-        OutputError: there is none, or it cannot be read.
+        OutputError: there is none, or it cannot be used: no JSON, an unknown or a missing key, a wrong type.
     """
     file = path / RUN
     try:
-        run = json.loads(file.read_text(encoding="utf-8"))
-        run["configuration"]["suite"]  # whatever is no run fails here
+        return _read_record(file, RunDescription)
     except OSError as error:
         raise OutputError(
             f"no run there ({error.strerror})", got=str(file), allowed="a folder that mpgrasp.bench has made"
         ) from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise OutputError("its run.json cannot be read", got=str(path), allowed="JSON of a run") from error
-    assert isinstance(run, dict)
-    return run
+
+
+def read_summary(path: Path) -> RunSummary | None:
+    """Content of a folder's summary.json; None where there is none.
+
+    Raises:
+        OutputError: it cannot be read or used: no JSON, an unknown or a missing key, a wrong type.
+    """
+    file = path / SUMMARY
+    try:
+        return _read_record(file, RunSummary)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise OutputError(
+            f"cannot be read ({error.strerror})", got=str(file), allowed="a readable file"
+        ) from error
 
 
 def read_complete(path: Path) -> bool | None:
-    """Whether summary.json says that a run is complete; None where it is not there or says nothing."""
+    """Return what summary.json says about a run being complete; None where it is not there or unusable."""
     try:
-        return bool(json.loads((path / SUMMARY).read_text(encoding="utf-8"))["complete"])
-    except (OSError, ValueError, KeyError, TypeError):
+        summary = read_summary(path)
+    except OutputError:
         return None
+    return None if summary is None else summary.complete
+
+
+def _read_record(file: Path, kind: type[Row]) -> Row:
+    try:
+        return record_of(kind, json.loads(file.read_text(encoding="utf-8")))
+    except ConfigError as error:
+        raise OutputError(f"{file} {error}", allowed="a file as mpgrasp.bench writes it") from error
+    except ValueError as error:
+        raise OutputError(f"{file} cannot be used: {error}", allowed="JSON, in UTF-8") from error
 
 
 def read_lines(path: Path) -> Lines:
     """Lines of episodes.jsonl; a last one that a full disk or a kill cut short is set apart.
 
     Raises:
-        OutputError: the file cannot be read, a line before the last is not one of an episode, or one
-            lacks a key that all such lines have.
+        OutputError: the file cannot be read, or a line is not one of an episode: no JSON, an unknown or a
+            missing key, a wrong type. It names file and number of the line.
     """
     file = path / EPISODES
     try:
@@ -74,40 +91,35 @@ def read_lines(path: Path) -> Lines:
         raise OutputError(
             f"no episodes there ({error.strerror})", got=str(file), allowed="a readable file"
         ) from error
-    lines: list[dict[str, Any]] = []
+    lines: list[Line] = []
     whole = 0
     texts = data.splitlines(keepends=True)
     for number, text in enumerate(texts, 1):
-        line = _parse(text)
-        if line is None and number < len(texts):
-            raise OutputError(
-                f"{file}, line {number} is not an episode's", got=text[:60].decode(errors="replace")
-            )
-        if line is None:
+        row = _parse(text)
+        if row is None and number == len(texts):
             return Lines(lines=lines, whole=whole, torn=text)
-        if missing := _missing(line):
-            raise OutputError(
-                f"{file}, line {number} is not an episode's: it lacks {', '.join(missing)}",
-                got=text[:60].decode(errors="replace"),
-                allowed="lines as mpgrasp.bench writes them",
-            )
-        lines.append(line)
+        if row is None:
+            raise _no_line(file, number, text, "it is no object of JSON")
+        try:
+            lines.append(line_of(row))
+        except ConfigError as error:
+            raise _no_line(file, number, text, str(error)) from error
         whole += len(text)
     return Lines(lines=lines, whole=whole, torn=None)
 
 
-def _parse(text: bytes) -> dict[str, Any] | None:
+def _parse(text: bytes) -> Mapping[str, Any] | None:
     """A line that holds an object; None for anything else, and for one without its end."""
     try:
-        line = json.loads(text)
+        row = json.loads(text)
     except ValueError:
         return None
-    return line if isinstance(line, dict) and text.endswith(b"\n") else None
+    return row if isinstance(row, dict) and text.endswith(b"\n") else None
 
 
-def _missing(line: Mapping[str, Any]) -> list[str]:
-    """Keys that a line should have and has not."""
-    needed = [*ALWAYS, *(("error",) if line.get("outcome") == ERROR else PLAYED)]
-    if "picks" in line:
-        needed += CLEARING
-    return [key for key in needed if key not in line]
+def _no_line(file: Path, number: int, text: bytes, reason: str) -> OutputError:
+    return OutputError(
+        f"{file}, line {number} is not an episode's ({reason})",
+        got=text[:60].decode(errors="replace"),
+        allowed="lines as mpgrasp.bench writes them",
+    )

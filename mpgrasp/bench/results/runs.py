@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from mpgrasp.bench.record import Cells, Task, by_cell
-from mpgrasp.bench.results.reader import RUN, read_run
+from mpgrasp.bench.record import Cell, Cells, ErrorLine, Line, by_cell
+from mpgrasp.bench.results.reader import EPISODES, RUN, read_complete, read_run
+from mpgrasp.bench.results.run_card import Configuration, RunDescription
 from mpgrasp.bench.results.trace import Trace, read_trace
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.exceptions import ConfigError
-
-Cell = tuple[str, str, str]
-"""(suite, detector, controller)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,63 +19,63 @@ class Run:
     """One folder of results."""
 
     folder: Path
-    about: Mapping[str, Any]
+    about: RunDescription
     """Content of run.json."""
-    lines: Sequence[Mapping[str, Any]]
-    """Of episodes.jsonl, one per episode."""
+    lines: Sequence[Line]
+    """Lines of episodes.jsonl, one per episode."""
     complete: bool | None
-    """What summary.json says; None where there is none."""
+    """True or False as summary.json says; None where there is none."""
 
     @property
-    def configuration(self) -> Mapping[str, Any]:
-        """What decided the results."""
-        found = self.about.get("configuration")
-        return found if isinstance(found, Mapping) else {}
+    def configuration(self) -> Configuration:
+        """All that decided the results."""
+        return self.about.configuration
 
-    def trace(self, line: Mapping[str, Any]) -> Trace | None:
-        """What was kept of an episode; None if nothing was.
+    def trace(self, line: Line) -> Trace | None:
+        """Return what the run or a recorded replay has kept of an episode; None if nothing was kept.
 
         Raises:
             OutputError: a file that is no trace.
         """
-        which = {key: line[key] for key in ("suite", "episode", "detector", "controller")}
-        task = Task(**which)
-        return read_trace(self.folder / "traces", task.stem, line)
+        if isinstance(line, ErrorLine):
+            return None
+        return read_trace(self.folder / "traces", line) or read_trace(self.folder / "recordings", line)
 
     def reads_truth(self, detector: str) -> bool:
-        """Whether a detector is shown the truth and needs no network."""
-        known = self.configuration.get("detectors") or ()
-        return any(item.get("name") == detector and item.get("reads_truth") for item in known)
+        """True if a detector is shown the truth and needs no network."""
+        known = self.configuration.detectors
+        return any(card.name == detector and card.reads_truth for card in known)
 
     def map_extent(self, controller: str) -> tuple[float, float, float, float] | None:
         """Bounds in x, then in y [m] of a controller's entropy map; None where it is not known."""
+        configs = [card.config for card in self.configuration.controllers if card.name == controller]
         try:
-            (config,) = [c["config"] for c in self.configuration["controllers"] if c["name"] == controller]
+            (config,) = configs
             (x, y), half = config["grid"]["centre"], config["grid"]["extent"] / 2
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError):  # a controller of one's own has the config that it likes
             return None
         return x - half, x + half, y - half, y + half
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Runs:
-    """What a report is about."""
+    """Runs that are reported together."""
 
     runs: Sequence[Run]
     cells: Cells
     """Lines by cell."""
     owners: Mapping[Cell, Run]
-    """Which run played a cell."""
+    """The run that played a cell."""
 
     @property
-    def lines(self) -> list[Mapping[str, Any]]:
+    def lines(self) -> list[Line]:
         """Every line of every run."""
         return [line for run in self.runs for line in run.lines]
 
     @property
     def suites(self) -> list[str]:
         """Names of the suites, in order of first appearance."""
-        return list(dict.fromkeys(suite for suite, _, _ in self.cells))
+        return list(dict.fromkeys(cell.suite for cell in self.cells))
 
 
 def find_runs(folders: Sequence[Path]) -> Runs:
@@ -97,7 +93,7 @@ def find_runs(folders: Sequence[Path]) -> Runs:
         for cell, lines in by_cell(run.lines).items():
             if cell in cells:
                 raise ConfigError(
-                    f"two runs have played {'/'.join(cell)}",
+                    f"two runs have played {cell}",
                     got=[str(owners[cell].folder), str(run.folder)],
                     allowed="each cell once in a report",
                 )
@@ -108,17 +104,14 @@ def find_runs(folders: Sequence[Path]) -> Runs:
 def _run_folders(folder: Path) -> list[Path]:
     if (folder / RUN).is_file():
         return [folder]
-    inside = sorted(
-        path.parent for path in folder.glob(f"*/{RUN}") if (path.parent / "episodes.jsonl").exists()
-    )
+    inside = sorted(path.parent for path in folder.glob(f"*/{RUN}") if (path.parent / EPISODES).exists())
     return inside or [folder]
 
 
 def _read(folder: Path) -> Run:
-    about = read_run(folder)
-    complete: bool | None
-    try:
-        complete = bool(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["complete"])
-    except (OSError, ValueError, KeyError, TypeError):
-        complete = None
-    return Run(folder=folder, about=about, lines=RunDirectory(folder).episodes(), complete=complete)
+    return Run(
+        folder=folder,
+        about=read_run(folder),
+        lines=RunDirectory(folder).episodes(),
+        complete=read_complete(folder),
+    )

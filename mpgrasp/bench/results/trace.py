@@ -1,4 +1,4 @@
-"""What a run keeps of an episode for its report: way, singular values, entropy map, and a few stills.
+"""Trace of an episode, kept for the report: way, singular values, entropy map, and a few stills.
 
 Ways are kept of the first `KEPT` episodes of each cell, about 2 kB each; stills and the entropy map of its
 first success and its first failure, about 45 kB.
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpgrasp.bench.record import PlayedLine
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.geometry import FloatArray
@@ -28,12 +29,12 @@ Arrays = Mapping[str, Any]
 """Arrays of a file by name."""
 
 _STILLS = "-stills"  # in the name of a file with pictures
-_NAME = re.compile(rf"(?P<cell>.+)-(?P<episode>\d+)-(?P<verdict>success|failure)(?P<stills>{_STILLS})?\.npz")
+_NAME = re.compile(rf"(?P<cell>.+)-(?P<episode>\d+)-(?P<ending>success|failure)(?P<stills>{_STILLS})?\.npz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """What was kept of one episode."""
+    """Way, singular values and stills of one episode."""
 
     times: FloatArray
     """(n,) since the start [s]."""
@@ -50,37 +51,32 @@ class Trace:
 
 
 def write_trace(
-    folder: Path,
-    stem: str,
-    record: Mapping[str, Any],
-    way: Callable[[], Arrays],
-    pictures: Callable[[], Arrays],
+    folder: Path, line: PlayedLine, way: Callable[[], Arrays], pictures: Callable[[], Arrays]
 ) -> None:
     """Write way and stills of an episode, each if it is wanted; what is not wanted is not asked for.
 
     Args:
         folder: of the traces; made if need be.
-        stem: of the file, cell and number of the episode, as in `Task.stem`.
-        record: `EpisodeResult.as_record()`; its `success` and `state_hash` count.
+        line: of the episode.
         way: gives times, positions and singular_values, as in `Trace`.
         pictures: gives still_0 and so on, still_times, still_phases, and entropy if there is any.
 
     Raises:
         OutputError: a file cannot be written.
     """
-    cell, _, number = stem.rpartition("-")
-    verdict, episode = _verdict(record), int(number)
-    hashed = {"state_hash": np.array(str(record.get("state_hash")))}
+    stem, ending = line.task.stem, _ending(line)
+    cell, _, _ = stem.rpartition("-")
+    hashed = {"state_hash": np.array(line.state_hash)}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for file in folder.glob(f"{glob.escape(stem)}-{_other(verdict)}*.npz"):
+        for file in folder.glob(f"{glob.escape(stem)}-{_other(ending)}*.npz"):
             file.unlink(missing_ok=True)  # of an earlier run that ended otherwise
-        before = (f.episode for f in _files(folder) if (f.cell, f.verdict) == (cell, verdict))
-        first = min(before, default=episode) >= episode
-        if first or episode < KEPT:
-            _write(folder / f"{stem}-{verdict}.npz", {**hashed, **way()})
+        before = (f.episode for f in _files(folder) if (f.cell, f.ending) == (cell, ending))
+        first = min(before, default=line.episode) >= line.episode
+        if first or line.episode < KEPT:
+            _write(folder / f"{stem}-{ending}.npz", {**hashed, **way()})
         if first:
-            _write(folder / f"{stem}-{verdict}{_STILLS}.npz", {**hashed, **pictures()})
+            _write(folder / f"{stem}-{ending}{_STILLS}.npz", {**hashed, **pictures()})
     except OSError as error:
         raise OutputError(
             f"a trace cannot be written ({error.strerror or error})",
@@ -95,19 +91,18 @@ def _write(file: Path, content: Arrays) -> None:
     replace_file(file, buffer.getvalue())
 
 
-def read_trace(folder: Path, stem: str, line: Mapping[str, Any]) -> Trace | None:
+def read_trace(folder: Path, line: PlayedLine) -> Trace | None:
     """The trace of the episode that a line of episodes.jsonl tells of; None if none was kept.
 
     Args:
         folder: of the traces.
-        stem: as in `Task.stem`.
-        line: its `success` and `state_hash` must be the trace's.
+        line: of the episode; its `success` and `state_hash` must be the trace's.
 
     Raises:
         OutputError: a file that is no trace.
     """
-    name = f"{stem}-{_verdict(line)}"
-    way, seen = (_read(folder / f"{name}{kind}.npz", str(line.get("state_hash"))) for kind in ("", _STILLS))
+    name = f"{line.task.stem}-{_ending(line)}"
+    way, seen = (_read(folder / f"{name}{kind}.npz", line.state_hash) for kind in ("", _STILLS))
     if way is None:
         return None
     seen = seen or {}
@@ -147,11 +142,11 @@ def prune_traces(folder: Path) -> None:
     files = _files(folder)
     first: dict[tuple[str, str], int] = {}
     for file in files:
-        key = file.cell, file.verdict
+        key = file.cell, file.ending
         first[key] = min(file.episode, first.get(key, file.episode))
     try:
         for file in files:
-            is_first = file.episode == first[file.cell, file.verdict]
+            is_first = file.episode == first[file.cell, file.ending]
             if not is_first and (file.stills or file.episode >= KEPT):
                 file.path.unlink(missing_ok=True)
     except OSError as error:
@@ -162,23 +157,23 @@ class _File(NamedTuple):
     path: Path
     cell: str
     episode: int
-    verdict: str
+    ending: str
     stills: bool
 
 
 def _files(folder: Path) -> list[_File]:
-    """What a folder holds of traces."""
+    """Files of traces in a folder."""
     found = []
     for path in folder.glob("*.npz"):
         if match := _NAME.fullmatch(path.name):
             number, stills = int(match["episode"]), match["stills"] is not None
-            found.append(_File(path, match["cell"], number, match["verdict"], stills))
+            found.append(_File(path, match["cell"], number, match["ending"], stills))
     return found
 
 
-def _verdict(record: Mapping[str, Any]) -> str:
-    return "success" if record.get("success") else "failure"
+def _ending(line: PlayedLine) -> str:
+    return "success" if line.success else "failure"
 
 
-def _other(verdict: str) -> str:
-    return "failure" if verdict == "success" else "success"
+def _other(ending: str) -> str:
+    return "failure" if ending == "success" else "success"

@@ -10,16 +10,19 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
-from mpgrasp.bench.record import ERROR, Line, Task
+import msgspec
+
+from mpgrasp.bench.analysis.summary import RunSummary
+from mpgrasp.bench.record import ErrorLine, Line, Record, Task, played, text_of
 from mpgrasp.bench.results.reader import EPISODES, RUN, SUMMARY, read_complete, read_lines, read_run
+from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescription
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
-from mpgrasp.files.json_values import difference, one_line, plain
+from mpgrasp.files.json_values import difference
 
 
 class RunDirectory:
@@ -32,7 +35,7 @@ class RunDirectory:
         self._episodes: int | None = None
 
     @classmethod
-    def create(cls, path: Path, run: Mapping[str, Any], planned: int | None = None) -> RunDirectory:
+    def create(cls, path: Path, run: RunDescription, planned: int | None = None) -> RunDirectory:
         """A folder for a new run, with its run.json.
 
         A folder that holds a complete run with the same `configuration` is taken over: its
@@ -40,7 +43,7 @@ class RunDirectory:
 
         Args:
             path: the folder; it is made if need be.
-            run: content of run.json; its `configuration` says what is being run.
+            run: content of run.json.
             planned: number of episodes that such a run has when it is complete; None if it depends on
                 their results.
 
@@ -49,20 +52,19 @@ class RunDirectory:
                 complete.
         """
         new = cls(path)
-        content = plain(run)
         with new._taking_over():
             path.mkdir(parents=True, exist_ok=True)
             new._claim()
-            new._refuse_other_run(content["configuration"])
+            new._refuse_other_run(run.configuration)
             new._refuse_unfinished_run(planned)
-            new._write(RUN, content)
+            new._write(RUN, run)
             new._keep_old_lines()
             (path / SUMMARY).unlink(missing_ok=True)
             new._open()
         return new
 
     @classmethod
-    def resume(cls, path: Path, run: Mapping[str, Any], note: Callable[[str], None]) -> RunDirectory:
+    def resume(cls, path: Path, run: RunDescription, note: Callable[[str], None]) -> RunDirectory:
         """The folder of a run that was interrupted, to be finished.
 
         A last line that is not whole is cut off. run.json gets an entry in `resumed`, with what the rest
@@ -77,25 +79,23 @@ class RunDirectory:
             OutputError: no run to finish, one with another configuration, or a folder that cannot be
                 written.
         """
-        new = cls(path)
-        content, before = plain(run), read_run(path)
-        found = difference(before["configuration"], content["configuration"])
+        new, before = cls(path), read_run(path)
+        found = difference(before.configuration.as_row(), run.configuration.as_row())
         if found:
             raise OutputError(
                 f"cannot resume with another configuration ({found.words('there', 'here')})",
                 got=str(path),
                 allowed="the configuration that the run began with, or another directory",
             )
-        entry: dict[str, Any] = {"started": content.get("started")}
-        changed = difference(before.get("made_with"), content.get("made_with"))
+        changed = difference(before.made_with.as_row(), run.made_with.as_row())
         if changed:
             note(f"not made with the same as the finished episodes ({changed.words('there', 'here')})")
-            entry["made_with"] = content["made_with"]
+        resumption = Resumption(started=run.started, made_with=run.made_with if changed else None)
         with new._taking_over():
             new._claim()
             if new.episodes_file.exists():
                 new._repair(note)
-            new._write(RUN, {**before, "resumed": [*before.get("resumed", []), entry]})
+            new._write(RUN, msgspec.structs.replace(before, resumed=(*before.resumed, resumption)))
             new._open()
         return new
 
@@ -104,25 +104,24 @@ class RunDirectory:
         """One line of JSON per episode."""
         return self.path / EPISODES
 
-    def append(self, line: Mapping[str, Any], stem: str = "episode") -> None:
+    def append(self, line: Line) -> None:
         """Add one episode: in a single write, and on the disk on return.
 
         Args:
-            line: what to add; the traceback of an error goes to a file of its own in errors/, and the
-                line says to which.
-            stem: name of that file.
+            line: of the episode; the traceback of an error goes to a file of its own in errors/, and the line
+                names it.
 
         Raises:
             OutputError: the disk is full or gone. What was there before stays whole.
         """
         assert self._episodes is not None
         try:
-            if line.get("outcome") == ERROR:
-                trace = Path("errors") / f"{stem}.txt"
+            if isinstance(line, ErrorLine):
+                trace = Path("errors") / f"{line.task.stem}.txt"
                 (self.path / trace).parent.mkdir(exist_ok=True)
-                (self.path / trace).write_text(str(line["traceback"]), encoding="utf-8")
-                line = {**line, "traceback": str(trace)}
-            data = one_line(line).encode()
+                (self.path / trace).write_text(line.traceback, encoding="utf-8")
+                line = msgspec.structs.replace(line, traceback=str(trace))
+            data = text_of(line).encode()
             size = os.fstat(self._episodes).st_size
             try:
                 if os.write(self._episodes, data) < len(data):
@@ -143,9 +142,8 @@ class RunDirectory:
         """
         lines: dict[Task, Line] = {}
         for line in read_lines(self.path).lines:
-            key = Task.of(line)
-            if key not in lines or line.get("outcome") != ERROR:
-                lines[key] = line
+            if line.task not in lines or not isinstance(line, ErrorLine):
+                lines[line.task] = line
         return list(lines.values())
 
     def settle(self, lines: Iterable[Line]) -> None:
@@ -155,19 +153,19 @@ class RunDirectory:
             OutputError: the file cannot be written anew; the old one stays as it is.
         """
         try:
-            replace_file(self.episodes_file, "".join(one_line(line) for line in lines))
+            replace_file(self.episodes_file, "".join(map(text_of, lines)))
         except OSError as error:
             raise _not_writable(self.episodes_file, error) from error
         self._close_episodes()  # it is the old file's
 
-    def write_summary(self, summary: Mapping[str, Any]) -> None:
+    def write_summary(self, summary: RunSummary) -> None:
         """Write summary.json.
 
         Raises:
             OutputError: the file cannot be written.
         """
         try:
-            self._write(SUMMARY, plain(summary))
+            self._write(SUMMARY, summary)
         except OSError as error:
             raise _not_writable(self.path / SUMMARY, error) from error
 
@@ -222,13 +220,13 @@ class RunDirectory:
             f"its episode is played again"
         )
 
-    def _refuse_other_run(self, configuration: Any) -> None:
+    def _refuse_other_run(self, configuration: Configuration) -> None:
         if (self.path / RUN).exists():
             try:
-                differs = difference(read_run(self.path)["configuration"], configuration)
+                differs = difference(read_run(self.path).configuration.as_row(), configuration.as_row())
                 found = differs and differs.words("there", "here")
-            except OutputError:
-                found = "its run.json cannot be read"
+            except OutputError as error:
+                found = str(error)
         elif self.episodes_file.exists():
             found = "episodes.jsonl without a run.json"
         else:
@@ -246,9 +244,8 @@ class RunDirectory:
             return
         lines = self.episodes()
         if lines:
-            played = sum(line["outcome"] != ERROR for line in lines)
             raise OutputError(
-                f"directory already holds this run, unfinished ({played} "
+                f"directory already holds this run, unfinished ({len(played(lines))} "
                 f"{'' if planned is None else f'of {planned} '}episodes are there)",
                 got=str(self.path),
                 allowed=f"--resume {self.path}, or another --out",
@@ -264,8 +261,8 @@ class RunDirectory:
             aside = self.path / f"episodes.previous-{number}.jsonl"
         os.replace(self.episodes_file, aside)
 
-    def _write(self, name: str, content: Any) -> None:
-        replace_file(self.path / name, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    def _write(self, name: str, content: Record) -> None:
+        replace_file(self.path / name, json.dumps(content.as_row(), indent=2, allow_nan=False) + "\n")
 
 
 def _not_writable(path: Path, error: OSError) -> OutputError:

@@ -237,7 +237,7 @@ def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path, workers: int) -> No
     script = """
         import sys, time
         import fakes, mpgrasp.episode.episode, mpgrasp.bench.playing.world_card
-        mpgrasp.bench.playing.world_card.world_card = lambda *_: {}
+        mpgrasp.bench.playing.world_card.world_card = lambda *_: fakes.WORLD
         mpgrasp.episode.episode.run_episode = fakes.unhurried
         from mpgrasp.bench.__main__ import main
         if __name__ == "__main__":

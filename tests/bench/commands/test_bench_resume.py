@@ -13,27 +13,18 @@ from typing import Any
 import fakes
 import numpy as np
 import pytest
-from bench_runs import PLUG_INS, records
+from bench_runs import PLUG_INS, records, records_without_timing, same_results, thin_command
 
 from mpgrasp.bench.__main__ import main
+from mpgrasp.bench.results.reader import read_run
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.exceptions import OutputError
-
-CELLS = [*PLUG_INS[:3], "fakes:FakeController,fakes:OtherController", *PLUG_INS[4:]]
-
-
-def command(out: Path, *more: str, episodes: int = 6) -> list[str]:
-    return ["thin", *CELLS, "--quiet", "--episodes", str(episodes), "--out", str(out), *more]
-
-
-def without_timing(out: Path) -> list[dict[str, Any]]:
-    return [{key: item for key, item in line.items() if key != "timing"} for line in records(out)]
 
 
 @pytest.fixture
 def whole(fake_world: object, tmp_path: Path) -> Path:
     """A run of 6 episodes that nothing has disturbed."""
-    assert main(command(tmp_path / "whole")) == 0
+    assert main(thin_command(tmp_path / "whole")) == 0
     return tmp_path / "whole"
 
 
@@ -41,16 +32,11 @@ def whole(fake_world: object, tmp_path: Path) -> Path:
 def part(fake_world: object, tmp_path: Path, whole: Path) -> Path:
     """The same run, killed after 5 lines, with its lines out of order."""
     out = tmp_path / "part"
-    assert main(command(out)) == 0
+    assert main(thin_command(out)) == 0
     lines = (out / "episodes.jsonl").read_text().splitlines(keepends=True)
     (out / "episodes.jsonl").write_text("".join([lines[1], lines[0], *lines[2:5]]))
     (out / "summary.json").unlink()
     return out
-
-
-def same(a: Path, b: Path) -> bool:
-    summaries = [(out / "summary.json").read_bytes() for out in (a, b)]
-    return summaries[0] == summaries[1] and without_timing(a) == without_timing(b)
 
 
 def test_a_resumed_run_ends_as_an_undisturbed_one(
@@ -58,7 +44,7 @@ def test_a_resumed_run_ends_as_an_undisturbed_one(
 ) -> None:
     kept = records(part)
     assert main(["--resume", str(part)]) == 0
-    assert same(part, whole)
+    assert same_results(part, whole)
     assert all(line in records(part) for line in kept)  # timing included: they were not played again
     assert "are there already" not in capsys.readouterr().err  # the run was begun with --quiet
     assert len(json.loads((part / "run.json").read_text())["resumed"]) == 1
@@ -67,7 +53,7 @@ def test_a_resumed_run_ends_as_an_undisturbed_one(
 def test_a_resumed_run_says_how_much_is_there_unless_it_is_quiet(
     part: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    loud = [word for word in command(part) if word not in ("--quiet", "--out", str(part))]
+    loud = [word for word in thin_command(part) if word not in ("--quiet", "--out", str(part))]
     capsys.readouterr()
     assert main([*loud, "--resume", str(part)]) == 0
     printed = capsys.readouterr()
@@ -80,28 +66,28 @@ def test_an_unfinished_run_is_resumed_or_refused_but_never_begun_anew(
 ) -> None:
     before = (part / "episodes.jsonl").read_bytes()
     capsys.readouterr()
-    assert main(command(part)) == 2
+    assert main(thin_command(part)) == 2
     printed = capsys.readouterr()
     assert f"unfinished (5 of 12 episodes are there); got '{part}'; allowed: --resume {part}" in printed.err
     assert printed.err.count("\n") == 1
     assert printed.out == ""
     assert (part / "episodes.jsonl").read_bytes() == before
     assert main(["--resume", str(part)]) == 0
-    assert same(part, whole)
-    assert main(command(part)) == 0  # it is complete now
-    assert same(part, whole)
+    assert same_results(part, whole)
+    assert main(thin_command(part)) == 0  # it is complete now
+    assert same_results(part, whole)
     assert len((part / "episodes.previous.jsonl").read_bytes().splitlines()) == 12
 
 
 def test_resuming_takes_the_whole_command_too_and_a_finished_run_is_left_as_it_is(
     part: Path, whole: Path
 ) -> None:
-    arguments = [word for word in command(part) if word not in ("--out", str(part))]
+    arguments = [word for word in thin_command(part) if word not in ("--out", str(part))]
     assert main([*arguments, "--resume", str(part)]) == 0
     before = (part / "episodes.jsonl").read_bytes()
     assert main(["--resume", str(part)]) == 0
     assert (part / "episodes.jsonl").read_bytes() == before
-    assert same(part, whole)
+    assert same_results(part, whole)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +129,7 @@ def test_a_torn_last_line_is_cut_off_with_a_note_and_nothing_is_lost(
         file.write(rest)
     assert main(["--resume", str(part)]) == 0
     assert "was not whole" in capsys.readouterr().err
-    assert same(part, whole)
+    assert same_results(part, whole)
     assert all(line in records(part) for line in kept)
 
 
@@ -161,10 +147,10 @@ def test_a_broken_line_in_the_middle_is_an_error_and_is_left_alone(
 def test_error_rows_are_tried_again(fake_world: pytest.MonkeyPatch, whole: Path, tmp_path: Path) -> None:
     out = tmp_path / "broken"
     fake_world.setattr("mpgrasp.episode.episode.run_episode", fakes.breaks_off)
-    assert main(command(out)) == 1
+    assert main(thin_command(out)) == 1
     fake_world.setattr("mpgrasp.episode.episode.run_episode", fakes.run_episode)
     assert main(["--resume", str(out)]) == 0
-    assert same(out, whole)
+    assert same_results(out, whole)
 
 
 @pytest.mark.parametrize(
@@ -205,11 +191,11 @@ def test_a_disk_that_fills_up_keeps_the_finished_episodes_and_can_be_resumed(
     out = tmp_path / "full"
     with pytest.MonkeyPatch.context() as disk:
         disk.setattr("os.write", full_after(3))
-        assert main(command(out)) == 2
+        assert main(thin_command(out)) == 2
     assert "cannot be written (disk full)" in capsys.readouterr().err
-    assert without_timing(out) == without_timing(whole)[:3]
+    assert records_without_timing(out) == records_without_timing(whole)[:3]
     assert main(["--resume", str(out)]) == 0
-    assert same(out, whole)
+    assert same_results(out, whole)
 
 
 def test_a_summary_that_finds_no_room_is_an_error_and_the_lines_stay(
@@ -223,13 +209,13 @@ def test_a_summary_that_finds_no_room_is_an_error_and_the_lines_stay(
     out = tmp_path / "full"
     with pytest.MonkeyPatch.context() as disk:
         disk.setattr("mpgrasp.bench.results.writer.replace_file", no_room)
-        assert main(command(out)) == 2
+        assert main(thin_command(out)) == 2
     printed = capsys.readouterr()
     assert "No space left" in printed.err
     assert "interval" in printed.out
-    assert without_timing(out) == without_timing(whole)
+    assert records_without_timing(out) == records_without_timing(whole)
     assert main(["--resume", str(out)]) == 0
-    assert same(out, whole)
+    assert same_results(out, whole)
 
 
 def test_a_read_only_directory_is_refused(
@@ -249,7 +235,7 @@ def test_a_read_only_directory_is_refused(
 
 
 def test_two_processes_do_not_write_to_one_run(part: Path) -> None:
-    content = json.loads((part / "run.json").read_text())
+    content = read_run(part)
     first = RunDirectory.resume(part, content, print)
     with pytest.raises(OutputError, match="another process is writing"):
         RunDirectory.resume(part, content, print)
@@ -288,13 +274,13 @@ def test_killed_20_times_a_run_ends_with_the_summary_of_an_undisturbed_one(
 ) -> None:
     fake_world.setattr("mpgrasp.episode.episode.run_episode", fakes.brisk)
     whole, out = tmp_path / "whole", tmp_path / "killed"
-    assert main(command(whole, episodes=200)) == 0
+    assert main(thin_command(whole, episodes=200)) == 0
     rng = np.random.default_rng(0)
     kills = 0
     for k in range(20):
         begun = (out / "run.json").exists()
         before = _count(out)
-        arguments = ["--resume", str(out)] if begun else command(out, episodes=200)
+        arguments = ["--resume", str(out)] if begun else thin_command(out, episodes=200)
         # the first ones wherever they strike on the way to the first episode, the others in the midst
         moment = (0, rng.uniform(0, 0.1)) if k < 5 else (before + 3, rng.uniform(0, 0.01))
         kills += _killed(arguments, out, *moment)
@@ -302,41 +288,4 @@ def test_killed_20_times_a_run_ends_with_the_summary_of_an_undisturbed_one(
     assert kills == 20
     assert 40 < _count(out) < 400
     assert main(["--resume", str(out)]) == 0
-    assert same(out, whole)
-
-
-def cells_of(out: Path) -> list[dict[str, Any]]:
-    return json.loads((out / "summary.json").read_text())["cells"]
-
-
-def test_batches_are_added_until_every_interval_is_narrow_enough_and_no_longer(
-    fake_world: object, tmp_path: Path
-) -> None:
-    out = tmp_path / "until"
-    assert main(command(out, "--until-ci", "30", episodes=5)) == 0
-    sizes = {cell["n"] for cell in cells_of(out)}
-    assert len(sizes) == 1
-    (n,) = sizes
-    assert n % 5 == 0
-    assert all(cell["wilson_high"] - cell["wilson_low"] < 0.30 for cell in cells_of(out))
-    shorter = tmp_path / "shorter"
-    assert main(command(shorter, episodes=n - 5)) == 0
-    assert any(cell["wilson_high"] - cell["wilson_low"] >= 0.30 for cell in cells_of(shorter))
-
-
-def test_a_cap_ends_what_would_never_be_narrow_enough(
-    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(command(tmp_path, "--until-ci", "1", "--max-episodes", "12", episodes=5)) == 0
-    assert {cell["n"] for cell in cells_of(tmp_path)} == {12}
-    assert "have not brought every interval of thin below 1 points" in capsys.readouterr().err
-
-
-def test_until_ci_ends_the_same_after_an_interruption(fake_world: object, tmp_path: Path) -> None:
-    whole, out = tmp_path / "whole", tmp_path / "part"
-    for folder in (whole, out):
-        assert main(command(folder, "--until-ci", "30", episodes=5)) == 0
-    lines = (out / "episodes.jsonl").read_text().splitlines(keepends=True)
-    (out / "episodes.jsonl").write_text("".join(reversed(lines[7:])))
-    assert main(["--resume", str(out)]) == 0
-    assert same(out, whole)
+    assert same_results(out, whole)

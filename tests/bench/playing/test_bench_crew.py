@@ -7,6 +7,7 @@ import sys
 import textwrap
 import time
 from pathlib import Path
+from typing import Any
 
 import fakes
 import numpy as np
@@ -15,24 +16,24 @@ from bench_plans import CONTROLLER, DETECTOR, lines_of, make_plan, without_timin
 
 from mpgrasp.bench.playing.player import Player
 from mpgrasp.exceptions import ConfigError, WeightsError
-from mpgrasp.files.json_values import difference, plain
+from mpgrasp.files.json_values import difference, json_value
 from mpgrasp.plugins import load_controller, load_detector
 from mpgrasp.suite import episode_seed
 
 
 def test_lines_say_which_episode_they_are() -> None:
     line = lines_of(make_plan(seed=7))[2]
-    assert (line["suite"], line["seed"], line["episode"]) == ("thin", 7, 2)
-    assert (line["detector"], line["controller"]) == (DETECTOR, CONTROLLER)
-    assert line["scene_seed"] == episode_seed("thin", 7, 2)
+    assert (line.suite, line.seed, line.episode) == ("thin", 7, 2)
+    assert (line.detector, line.controller) == (DETECTOR, CONTROLLER)
+    assert line.scene_seed == episode_seed("thin", 7, 2)
 
 
 def test_every_cell_meets_the_same_scenes() -> None:
     lines = lines_of(make_plan(controllers=(CONTROLLER, "fakes:OtherController")))
-    assert [line["episode"] for line in lines] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert [line.episode for line in lines] == [0, 0, 1, 1, 2, 2, 3, 3]
     for a, b in zip(lines[::2], lines[1::2], strict=True):
-        assert a["controller"] != b["controller"]
-        assert a["scene_seed"] == b["scene_seed"]
+        assert a.controller != b.controller
+        assert a.scene_seed == b.scene_seed
 
 
 def test_two_runs_differ_in_timing_alone() -> None:
@@ -53,12 +54,12 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     script.write_text(
         textwrap.dedent("""
         import multiprocessing, os, signal
-        import bench_plans as t, fakes
+        import bench_plans as t
         def kill(line):
             print(*[child.pid for child in multiprocessing.active_children()], flush=True)
             os.kill(os.getpid(), signal.SIGKILL)
         if __name__ == "__main__":
-            t.play_all(t.make_plan(), kill, workers=2, run_episode=fakes.run_episode)
+            t.play(t.make_plan(), kill, workers=2)
         """)
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(Path(fakes.__file__).parent)])}
@@ -95,7 +96,7 @@ def _alive(pid: int) -> bool:
         ({"until_ci": 10.0, "max_episodes": 3}, "max-episodes out of range; got 3; allowed: 4"),
     ],
 )
-def test_impossible_plans_are_refused(settings: dict, message: str) -> None:
+def test_impossible_plans_are_refused(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         make_plan(**settings)
 
@@ -153,8 +154,10 @@ def test_the_order_of_a_plan_is_that_of_its_tasks_whatever_order_they_come_in() 
 
 def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:
     value = {"a": (1, np.int64(2)), "b": np.array([0.1 + 0.2]), "p": Path("x"), "o": object(), "s": {3, 1}}
-    assert plain(value) == {"a": [1, 2], "b": [0.3], "p": "x", "o": "builtins.object", "s": [1, 3]}
-    assert json.loads(json.dumps(plain(make_plan())))["suites"][0]["scenes"][0]["objects"] == ["usb_stick"]
+    assert json_value(value) == {"a": [1, 2], "b": [0.3], "p": "x", "o": "builtins.object", "s": [1, 3]}
+    assert json.loads(json.dumps(json_value(make_plan())))["suites"][0]["scenes"][0]["objects"] == [
+        "usb_stick"
+    ]
 
 
 def test_the_first_difference_is_named_by_its_path() -> None:

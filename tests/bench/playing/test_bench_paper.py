@@ -9,14 +9,14 @@ from typing import Any
 
 import fakes
 import pytest
-from bench_runs import records
+from bench_runs import clearing_row, grasp_row, pick_row, records, stop_row
 from rich.console import Console
 
 from mpgrasp.bench.__main__ import main
-from mpgrasp.bench.analysis.summary import summarise, time_limits
+from mpgrasp.bench.analysis.summary import ClearingCounts, summarise, time_limits
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.programme import PROGRAMMES, Programme, load_suites
-from mpgrasp.bench.record import Cell, by_cell
+from mpgrasp.bench.record import Line, Method, by_cell, line_of
 from mpgrasp.bench.report.terminal import print_table
 from mpgrasp.episode.config import ClearingConfig
 from mpgrasp.exceptions import ConfigError
@@ -24,50 +24,48 @@ from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.suite import load_suite, parse_suite, suite_names
 
 DETECTOR, CONTROLLER = "fakes:FakeDetector", "fakes:FakeController"
-CELL = {"detector": "d", "controller": "c", "seed": 0}
 
 
-def clearing(
-    episode: int = 0, *, success: bool = True, time: float = 200.0, **changes: Any
-) -> dict[str, Any]:
-    """A line of episodes.jsonl of a clearing of three objects."""
-    picks = [{"outcome": outcome} for outcome in ("success", "missed", "success", "success")]
-    line = {
-        "suite": "stacked", "episode": episode, "scene_seed": episode, "object": "3 objects",
-        "outcome": "success" if success else "no_grasp", "success": success, "sim_time_s": time,
-        "time_limit_s": 900.0, "reflex": None, "stops": [], "picks": picks, "state_hash": "",
-        "in_basket": ["a", "b"], "knocked_off": ["c"], "left": [],
-    }  # fmt: skip
-    return {**line, **CELL, **changes}
+def clearing(episode: int = 0, *, success: bool = True, time: float = 200.0, **changes: Any) -> Line:
+    """A line of a clearing of three objects."""
+    picks = [pick_row(success=success) for success in (True, False, True, True)]
+    row = clearing_row(
+        suite="stacked", episode=episode, scene_seed=episode, object="3 objects", success=success,
+        sim_time_s=time, picks=picks, in_basket=["a", "b"], knocked_off=["c"],
+    )  # fmt: skip
+    return line_of({**row, **({} if success else {"outcome": "no_grasp"}), **changes})
 
 
-def grasp(episode: int = 0) -> dict[str, Any]:
+def grasp(episode: int = 0) -> Line:
     """A line of a single grasp."""
-    line = {"suite": "thin", "episode": episode, "object": "usb_stick", "outcome": "success"}
-    return {**line, "success": True, "sim_time_s": 12.0, "reflex": None, **CELL}
+    return line_of(grasp_row(suite="thin", episode=episode, object="usb_stick", sim_time_s=12.0))
 
 
 def test_the_paper_is_six_cells_over_four_suites_with_a_ceiling_and_a_floor() -> None:
     paper = PROGRAMMES["paper"]
     assert paper.suites == ("single", "unseen", "thin", "stacked")
     cells = [(d, c) for d in ("ggcnn2", "tfgrasp", "dhrnet") for c in ("mvp", "mppc")]
-    assert list(paper.cells()) == [*cells, ("oracle", "mppc"), ("dhrnet", "open_loop")]
+    assert [tuple(method) for method in paper.methods()] == [
+        *cells,
+        ("oracle", "mppc"),
+        ("dhrnet", "open_loop"),
+    ]
 
 
 def test_who_is_named_plays_instead_of_the_papers_cells() -> None:
     paper = PROGRAMMES["paper"]
-    assert paper.cells(["oracle"]) == (("oracle", "mvp"), ("oracle", "mppc"))
-    assert paper.cells(None, ["mppc"]) == tuple((d, "mppc") for d in paper.detectors)
-    assert paper.cells(["a"], ["b"]) == (("a", "b"),)
+    assert paper.methods(["oracle"]) == (("oracle", "mvp"), ("oracle", "mppc"))
+    assert paper.methods(None, ["mppc"]) == tuple((d, "mppc") for d in paper.detectors)
+    assert paper.methods(["a"], ["b"]) == (("a", "b"),)
 
 
 def test_a_suite_is_played_as_often_as_the_paper_did_unless_told_otherwise() -> None:
     suites = (load_suite("unseen"), load_suite("thin"))
-    plan = Plan(suites=suites, programme="p", cells=(Cell("d", "c"), Cell("e", "c")))
+    plan = Plan(suites=suites, programme="p", methods=(Method("d", "c"), Method("e", "c")))
     tasks = plan.tasks()
     assert [sum(task.suite == name for task in tasks) for name in ("unseen", "thin")] == [80, 20]
     assert [task.suite for task in tasks] == ["unseen"] * 80 + ["thin"] * 20
-    few = Plan(suites=suites, cells=plan.cells, episodes=3)
+    few = Plan(suites=suites, methods=plan.methods, episodes=3)
     assert len(few.tasks()) == 2 * 2 * 3
     assert len({task.stem for task in tasks}) == len(set(tasks)) == 100
 
@@ -136,21 +134,23 @@ def test_a_programme_can_be_played_in_parts_that_keep_its_order() -> None:
 def test_a_clearing_that_came_to_no_end_counts_as_its_time_limit() -> None:
     lines = [clearing(0, time=200.0), clearing(1, time=300.0), clearing(2, success=False, time=50.0)]
     (cell,) = summarise(lines)
-    assert cell["time_limit_s"] == 900.0
-    assert cell["mean_time_s"] == pytest.approx((200 + 300 + 900) / 3)
-    assert (cell["median_time_s"], cell["successes"]) == (300.0, 2)
-    assert cell["median_time_low"] <= 300.0 <= cell["median_time_high"]
+    assert cell.time_limit_s == 900.0
+    assert cell.mean_time_s == pytest.approx((200 + 300 + 900) / 3)
+    assert (cell.median_time_s, cell.successes) == (300.0, 2)
+    assert cell.median_time_low is not None
+    assert cell.median_time_high is not None
+    assert cell.median_time_low <= 300.0 <= cell.median_time_high
     assert time_limits(by_cell(lines[:2])) == {"stacked": None}
 
 
 def test_attempts_and_objects_add_up_over_clearings_and_all_stops_count() -> None:
-    stops = [{"limit": "contact_force"}, {"limit": "joint_velocity"}]
+    stops = [stop_row(limit="contact_force"), stop_row(limit="joint_velocity")]
     cleared, thin = summarise([clearing(0), clearing(1, stops=stops, reflex=stops[0]), grasp()])
-    assert cleared["clearing"] == {
-        "attempts": 8, "failed_attempts": {"missed": 2}, "in_basket": 4, "knocked_off": 2, "left": 0,
-    }  # fmt: skip
-    assert cleared["reflexes"] == {"contact_force": 1, "joint_velocity": 1}
-    assert thin["clearing"] is None
+    assert cleared.clearing == ClearingCounts(
+        attempts=8, failed_attempts={"missed": 2}, in_basket=4, knocked_off=2, left=0
+    )
+    assert cleared.reflexes == {"contact_force": 1, "joint_velocity": 1}
+    assert thin.clearing is None
 
 
 def test_the_table_shows_picks_only_where_something_was_cleared() -> None:
@@ -167,7 +167,7 @@ def two_suites(fake_world: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """A programme of two suites that takes no time."""
     programme = Programme(
         title="t", suites=("thin", "stacked"), detectors=(DETECTOR,), controllers=(CONTROLLER,),
-        references=(Cell(DETECTOR, "fakes:OtherController"),),
+        references=(Method(DETECTOR, "fakes:OtherController"),),
     )  # fmt: skip
     fake_world.setitem(PROGRAMMES, "both", programme)
     fake_world.setattr("mpgrasp.episode.clearing.run_clearing", fakes.run_episode)

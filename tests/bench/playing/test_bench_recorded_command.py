@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from bench_runs import PLUG_INS, records
+from bench_runs import PLUG_INS, records, run_row
 
 from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.commands.run import make_parser
@@ -81,25 +81,30 @@ def test_what_decides_results_tells_files_by_name_and_hash_and_nobodys_folders(
     assert str(moved[1].parent) not in text
 
 
-@pytest.mark.parametrize("run", ["{}", '{"command": "python -m mpgrasp.bench"}', '{"command": 3}'])
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("python -m mpgrasp.bench", "does not say by which command it was made"),
+        ("python -m mpgrasp.bench 'thin", "does not say by which command it was made"),
+        (3, "run.json cannot be used: Expected `str`, got `int` - at `$.command`"),
+    ],
+)
 def test_a_run_that_does_not_say_how_it_was_made_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], run: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: object, message: str
 ) -> None:
-    content = {**json.loads(run), "configuration": {"suite": "thin"}}
-    (tmp_path / "run.json").write_text(json.dumps(content))
+    (tmp_path / "run.json").write_text(json.dumps(run_row(command=command)))
     assert main(["--resume", str(tmp_path)]) == 2
     error = capsys.readouterr().err
-    assert "does not say by which command it was made" in error
+    assert message in error
     assert error.count("\n") == 1
 
 
 def test_a_folder_called_as_the_scans_is_still_a_folder(tmp_path: Path) -> None:
     (tmp_path / "ycb").mkdir()
     command = "python -m mpgrasp.bench single --objects ./ycb ycb"
-    content = {"command": command, "configuration": {"suite": "single"}}
     run = tmp_path / "runs" / "one"
     run.mkdir(parents=True)
-    (run / "run.json").write_text(json.dumps(content))
+    (run / "run.json").write_text(json.dumps(run_row(command=command)))
     folder, scans = recorded_arguments(run, make_parser()).objects
     assert Path(folder) == tmp_path / "ycb"
     assert scans == "ycb"

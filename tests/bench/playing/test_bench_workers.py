@@ -6,12 +6,12 @@ from typing import Any
 
 import fakes
 import pytest
-from bench_plans import lines_of, make_plan, without_timing
+from bench_plans import lines_of, make_plan, play, without_timing
 
 from mpgrasp.bench.playing import workers
-from mpgrasp.bench.playing.crew import play_all
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import EpisodeError
+from mpgrasp.bench.record import ErrorLine, Line
 from mpgrasp.suite import TRIALS, load_suite
 
 CRASHES = {
@@ -23,26 +23,29 @@ CRASHES = {
 
 def played(
     run_episode: Any, *, hang_after: float | None = 60.0, count: int = 1, episodes: int = 3
-) -> tuple[list[dict], list[str]]:
+) -> tuple[list[Line], list[str]]:
     """Lines in the order of the episodes, and the notes."""
-    lines: list[dict] = []
+    lines: list[Line] = []
     notes: list[str] = []
     plan = make_plan(episodes=episodes)
-    play_all(
-        plan, lines.append, workers=count, run_episode=run_episode, hang_after=hang_after, note=notes.append
-    )
-    return sorted(lines, key=lambda line: line["episode"]), notes
+    play(plan, lines.append, workers=count, run_episode=run_episode, hang_after=hang_after, note=notes.append)
+    return sorted(lines, key=lambda line: line.episode), notes
+
+
+def broken(line: Line) -> ErrorLine:
+    assert isinstance(line, ErrorLine)
+    return line
 
 
 def test_a_crash_costs_one_retry_and_then_its_episode_alone() -> None:
     lines, notes = played(fakes.crashes, count=2, episodes=5)
-    assert [line["outcome"] == "error" for line in lines] == [False, True, True, True, False]
+    assert [line.outcome == "error" for line in lines] == [False, True, True, True, False]
     for episode, (how, trace) in CRASHES.items():
-        broken = lines[episode]
-        assert broken["success"] is None
-        assert how in broken["error"]
-        assert broken["traceback"].count("attempt") == 2
-        assert trace in broken["traceback"]
+        line = broken(lines[episode])
+        assert line.success is None
+        assert how in line.error
+        assert line.traceback.count("attempt") == 2
+        assert trace in line.traceback
         (note,) = [text for text in notes if f"episode {episode} " in text]
         assert "played again" in note
     undisturbed = lines_of(make_plan(episodes=5))
@@ -53,9 +56,9 @@ def test_a_hang_ends_after_its_time_and_shows_where_it_was() -> None:
     clock = time.monotonic()
     lines, _ = played(fakes.hangs, hang_after=0.3, count=2)
     assert time.monotonic() - clock < 300  # of 3600; starting workers takes long on a busy machine
-    assert [line["outcome"] == "error" for line in lines] == [False, True, False]
-    assert "hung: no answer within 0.3 s" in lines[1]["error"]
-    assert "in hangs" in lines[1]["traceback"]
+    assert [line.outcome == "error" for line in lines] == [False, True, False]
+    assert "hung: no answer within 0.3 s" in broken(lines[1]).error
+    assert "in hangs" in broken(lines[1]).traceback
 
 
 def test_a_worker_that_lets_go_of_its_pipe_and_lives_on_is_not_waited_for(
@@ -63,8 +66,8 @@ def test_a_worker_that_lets_go_of_its_pipe_and_lives_on_is_not_waited_for(
 ) -> None:
     monkeypatch.setattr(workers, "END_LIMIT", 0.2)
     lines, _ = played(fakes.lets_go)
-    assert [line["outcome"] == "error" for line in lines] == [False, True, False]
-    assert "closed its pipe and went on" in lines[1]["error"]  # in the end it would say: exit code 0
+    assert [line.outcome == "error" for line in lines] == [False, True, False]
+    assert "closed its pipe and went on" in broken(lines[1]).error  # in the end it would say: exit code 0
 
 
 def test_every_trial_has_its_own_time_after_which_it_is_taken_for_hung(
@@ -73,10 +76,10 @@ def test_every_trial_has_its_own_time_after_which_it_is_taken_for_hung(
     assert set(workers.HANG_AFTER) == set(TRIALS)
     monkeypatch.setattr(workers, "HANG_AFTER", {"grasp": 0.3, "clear": 1e9})
     lines, _ = played(fakes.hangs, hang_after=None)
-    assert [line["outcome"] == "error" for line in lines] == [False, True, False]
-    assert "hung: no answer within 0.3 s" in lines[1]["error"]
+    assert [line.outcome == "error" for line in lines] == [False, True, False]
+    assert "hung: no answer within 0.3 s" in broken(lines[1]).error
     suite = load_suite("stacked")
-    plan = Plan(suites=(suite,), cells=make_plan().cells)
+    plan = Plan(suites=(suite,), methods=make_plan().methods)
     pool = workers.WorkerPool(plan, 1, fakes.run_episode, hang_after=None, attempts=1)
     assert pool._limit(plan.tasks()[0]) == 1e9
 
@@ -93,9 +96,9 @@ def test_an_episode_that_succeeds_at_the_second_attempt_is_as_if_nothing_had_hap
 @pytest.mark.parametrize("count", [0, 1])
 def test_an_exception_is_an_error_row_with_its_traceback(count: int) -> None:
     lines, notes = played(fakes.breaks_off, count=count)
-    assert [line["outcome"] == "error" for line in lines] == [False, True, True]
-    assert "ZeroDivisionError: a bug in a detector" in lines[1]["error"]
-    assert "fakes.py" in lines[1]["traceback"]
+    assert [line.outcome == "error" for line in lines] == [False, True, True]
+    assert "ZeroDivisionError: a bug in a detector" in broken(lines[1]).error
+    assert "fakes.py" in broken(lines[1]).traceback
     assert len(notes) == 2
 
 

@@ -43,11 +43,11 @@ function measure(frame) {
 
 
 class Seen(NamedTuple):
-    """What a browser made of a page."""
+    """A page as a browser saw it."""
 
     measured: dict[str, Any]
     console: list[str]
-    """What it complained about."""
+    """Complaints of the browser."""
     requests: list[str]
     """Addresses that the page asked the network for."""
 
@@ -82,7 +82,7 @@ def look(page: str, folder: Path, width: int) -> Seen:
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A report with long names, folded tables, pictures and filmstrips."""
+    """A report with long names, folded tables, figures and filmstrips."""
     long = lines("10" * 20, detector="a_package.with_a_module:AndARatherLongNameOfItsClass", controller="mvp")
     folder = make_run(tmp_path_factory.mktemp("browser") / ("a-long-name-" * 8), [*EPISODES, *long], **CARD)
     for line in (EPISODES[0], EPISODES[2], long[0]):

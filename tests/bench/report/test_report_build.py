@@ -3,28 +3,29 @@ from __future__ import annotations
 import html
 import json
 import re
-from dataclasses import replace
+import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+import fakes
 import pytest
-from bench_runs import PLUG_INS
-from toy_runs import CARD, EPISODES, lines, make_run, trace
+from bench_runs import PLUG_INS, detector_row
+from msgspec.structs import replace as changed
+from toy_runs import CARD, EPISODES, lines, make_run, show, trace
 
 from mpgrasp.bench.__main__ import main
-from mpgrasp.bench.analysis.hypotheses import Verdict, evaluate
-from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Claim, Measure, reported
-from mpgrasp.bench.record import by_cell
+from mpgrasp.bench.analysis.paper import CLAIMS
+from mpgrasp.bench.record import played
 from mpgrasp.bench.report.build import write_report
-from mpgrasp.bench.report.document import Folded, Listing, Paragraph, Section, Table, to_html, to_markdown
-from mpgrasp.bench.report.paper_tables import hypothesis_blocks
-from mpgrasp.bench.results.trace import KEPT, prune_traces, read_trace
-from mpgrasp.exceptions import OutputError
+from mpgrasp.bench.results.runs import find_runs
+from mpgrasp.recording.recorder import NullRecorder, Recorder
 
 
 class Page(HTMLParser):
-    """What a page refers to, its tables and the names of its pictures."""
+    """References of a page, its tables and the images and figures without a name."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -102,7 +103,7 @@ def test_the_page_loads_nothing_and_runs_nothing(folder: Path, page: Page) -> No
     assert "default-src 'none'" in (folder / "report.html").read_text()
 
 
-def test_ids_are_unique_links_lead_somewhere_and_pictures_have_names(page: Page) -> None:
+def test_ids_are_unique_links_lead_somewhere_and_figures_have_names(page: Page) -> None:
     assert len(page.ids) == len(set(page.ids))
     assert {r[1:] for r in page.references if r.startswith("#")} <= set(page.ids)
     assert page.tags.count("svg") >= 4
@@ -114,16 +115,16 @@ def test_every_failure_and_error_has_its_seed_and_the_command_that_plays_it_agai
     folder: Path, page: Page
 ) -> None:
     (table,) = [t for t in page.tables if "play it again" in t[0]]
-    broken = [line for line in EPISODES if not line["success"]]
+    broken = [line for line in EPISODES if not line.success]
     assert len(table) == 1 + len(broken) == 1 + 5
     markdown = (folder / "report.md").read_text()
     for line in broken:
         command = (
-            f"python -m mpgrasp.bench replay '{folder}' --episode {line['episode']} "
-            f"--cell thin/{line['detector']}/{line['controller']} --record"
+            f"python -m mpgrasp.bench replay '{folder}' --episode {line.episode} "
+            f"--cell thin/{line.detector}/{line.controller} --record"
         )
         (row,) = [row for row in table if row[-1] == command]
-        assert row[3] == str(line["scene_seed"])
+        assert row[3] == str(line.scene_seed)
         assert f"`{command}`" in markdown
     (error,) = [row for row in table if row[5].startswith("error: a bug")]
     assert "errors/4.txt" in error[5]
@@ -169,7 +170,8 @@ def test_the_papers_cells_that_are_absent_are_said_to_be_absent(page: Page) -> N
 
 
 def test_objects_are_told_apart_and_refused_meshes_are_named(tmp_path: Path) -> None:
-    meshes = [{"name": "mug", "reason": None}, {"name": "sieve", "reason": "open: 120 edges"}]
+    mesh: dict[str, Any] = {"file": "it.obj", "sha256": None, "grasp_qualities": []}
+    meshes = [{**mesh, "name": "mug"}, {**mesh, "name": "sieve", "reason": "open: 120 edges"}]
     episodes = [*lines("10", object="mug"), *lines("xx11", object="jug")[2:]]
     run = make_run(tmp_path / "run", episodes, objects=meshes)
     write_report([run], run)
@@ -178,14 +180,77 @@ def test_objects_are_told_apart_and_refused_meshes_are_named(tmp_path: Path) -> 
     assert [["mesh", "why"], ["sieve", "open: 120 edges"]] in tables
 
 
-def test_without_traces_and_card_the_report_says_so(tmp_path: Path) -> None:
+def test_without_card_and_pairs_the_report_says_so(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", lines("10"))
     write_report([run], run)
     text = (run / "report.md").read_text()
-    assert "Not kept: singular values and ways of suite thin" in text
-    assert "Not kept: stills of thin: DHRNet + MP-PC, success; thin: DHRNet + MP-PC, failure." in text
     assert "has no physics card" in text
     assert "No two cells of one suite" in text
+
+
+def test_without_traces_the_report_gives_the_commands_that_make_them(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", [*lines("x110"), *lines("00", controller="mvp")])
+    write_report([run], run)
+    text, page = (run / "report.md").read_text(), Page((run / "report.html").read_text())
+    replay = f"python -m mpgrasp.bench replay {run} --episode {{}} --cell thin/dhrnet/{{}} --record"
+    assert "Not kept: singular values and ways of suite thin (DHRNet + MP-PC, DHRNet + MVP)." in text
+    assert f"```sh\n{replay.format(1, 'mppc')}\n{replay.format(0, 'mvp')}\n```" in text
+    (table,) = [t for t in page.tables if t[0][-1] == "what makes it"]
+    assert table[1:] == [
+        ["thin", "DHRNet + MP-PC", "success", "1", replay.format(1, "mppc")],
+        ["thin", "DHRNet + MP-PC", "failure", "3", replay.format(3, "mppc")],
+        ["thin", "DHRNet + MVP", "failure", "0", replay.format(0, "mvp")],
+    ]
+    assert "No episode to show: thin: DHRNet + MVP, success." in text
+    # the figures of rates and times, and no empty ones
+    assert page.tags.count("svg") == page.tags.count("figure") == 2
+    assert "img" not in page.tags
+
+
+@pytest.mark.parametrize("where", ["traces", "recordings"])
+def test_of_a_cell_with_traces_of_the_run_or_of_a_replay_nothing_is_missing(
+    tmp_path: Path, where: str
+) -> None:
+    run = make_run(tmp_path / "run", [*lines("1"), *lines("1", controller="mvp")])
+    trace(run / where, lines("1")[0])
+    write_report([run], run)
+    text = (run / "report.md").read_text()
+    assert "Not kept: singular values and ways of suite thin (DHRNet + MVP)." in text
+    assert "Figure in report.html: thin: DHRNet + MP-PC, way of the tool point from above" in text
+    assert "Figure in report.html: thin: DHRNet + MP-PC, success: episode 0" in text
+
+
+def test_a_recorded_replay_brings_the_trace_of_its_episode(
+    tmp_path: Path, fake_world: pytest.MonkeyPatch
+) -> None:
+    def shown(*arguments: Any, recorder: Recorder, **others: Any) -> fakes.FakeResult:
+        show(recorder)
+        return fakes.run_episode(*arguments, recorder=recorder, **others)
+
+    for kind in ("film.FilmRecorder", "rerun.RerunRecorder"):
+        fake_world.setattr(f"mpgrasp.recording.{kind}", lambda *_, **__: NullRecorder())
+    fake_world.setattr("mpgrasp.episode.episode.run_episode", shown)
+    assert (
+        main(["thin", *PLUG_INS, "--episodes", "1", "--camera", "ray", "--out", str(tmp_path), "--quiet"])
+        == 0
+    )
+    shutil.rmtree(tmp_path / "traces")
+    (run,) = find_runs([tmp_path]).runs
+    assert run.trace(run.lines[0]) is None
+    assert main(["replay", str(tmp_path), "--episode", "0", "--record"]) == 0
+    found = run.trace(run.lines[0])
+    assert found is not None
+    assert found.stills
+
+
+def test_a_tick_without_a_singular_value_hides_no_others(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", lines("1"))
+    trace(run / "traces", lines("1")[0], unmeasured=1)
+    write_report([run], run)
+    assert "DHRNet + MP-PC down to 0.103 in 1 episodes" in (run / "report.md").read_text()
+    trace(run / "traces", lines("1")[0], unmeasured=30)
+    write_report([run], run)
+    assert "DHRNet + MP-PC not measured in 1 episodes" in (run / "report.md").read_text()
 
 
 @pytest.mark.parametrize("pattern", ["", "x", "xx"])
@@ -198,7 +263,7 @@ def test_runs_without_a_played_episode_have_a_report_too(tmp_path: Path, pattern
 def test_a_broken_trace_is_said_and_one_of_another_run_is_not_shown(tmp_path: Path) -> None:
     episodes = lines("110")
     run = make_run(tmp_path / "run", episodes)
-    trace(run / "traces", {**episodes[1], "state_hash": "other"})
+    trace(run / "traces", changed(played(episodes)[1], state_hash="other"))
     (run / "traces" / "thin-dhrnet-mppc-0000-success.npz").write_bytes(b"PK\3\4 no trace")
     write_report([run], run)
     text = (run / "report.md").read_text()
@@ -209,25 +274,27 @@ def test_a_broken_trace_is_said_and_one_of_another_run_is_not_shown(tmp_path: Pa
 def test_differences_between_runs_are_told_with_their_folders(tmp_path: Path) -> None:
     folders = [
         make_run(tmp_path / "a", lines("1"), camera={"name": "it is there and here"}),
-        make_run(tmp_path / "b", lines("1", controller="mvp"), camera={"name": "gone"}),
+        make_run(tmp_path / "b", lines("1", controller="mvp"), camera={"name": "gone"}, noise=False),
     ]
     write_report(folders, tmp_path)
     told = f'name: "it is there and here" in `{folders[0]}`, "gone" in `{folders[1]}`'
-    assert f"Not the same in all runs: camera.{told}" in (tmp_path / "report.md").read_text()
+    text = (tmp_path / "report.md").read_text()
+    assert f"Not the same in all runs: camera.{told}" in text
+    assert f"Not the same in all runs: noise: true in `{folders[0]}`, false in `{folders[1]}`" in text
 
 
 def test_a_ticks_time_is_split_between_the_network_and_all_else(tmp_path: Path) -> None:
     slow = {"render": 1.0, "detect": 6.0, "control": 1.0, "ik": 1.0, "physics": 1.0}
     run = make_run(
         tmp_path / "run",
-        # an error row and the line of an older version have no times
+        # an error row has no times, and of a plug-in's tick not all may be known
         [
             *lines("11x0"),
             *lines("1", controller="mvp", timing=slow),
             *lines("0", detector="oracle", timing=slow),
-            {**lines("11")[1], "controller": "mvp", "timing": {"detect": 9e9}},
+            *lines("11", controller="mvp", timing={"detect": 9e9})[1:],
         ],
-        detectors=[{"name": "oracle", "reads_truth": True}, {"name": "dhrnet", "reads_truth": False}],
+        detectors=[detector_row("oracle", reads_truth=True), detector_row("dhrnet")],
     )
     write_report([run], run)
     text = (run / "report.md").read_text()
@@ -276,214 +343,11 @@ def test_unusable_folders_are_one_line_and_exit_code_2(
         assert message in error
 
 
-def test_text_is_escaped_and_code_is_marked() -> None:
-    blocks = (
-        Paragraph(text="a < b & `c<d>`"),
-        Listing(lines=["x > y"]),
-        Folded(summary="more", blocks=(Table(caption="t", headings=("h",), rows=[("p|q `r",)]),)),
+@pytest.mark.parametrize("words", [("--help",), ("report", "--help")])
+def test_help_loads_no_template_engine(words: tuple[str, ...]) -> None:
+    code = (
+        "import atexit, runpy, sys; atexit.register(lambda: print('jinja2' in sys.modules))\n"
+        f"sys.argv = {['bench', *words]}; runpy.run_module('mpgrasp.bench', run_name='__main__')"
     )
-    page = to_html("<T>", [Section(title="S & S", blocks=blocks)])
-    assert "<p>a &lt; b &amp; <code>c&lt;d&gt;</code></p>" in page
-    assert "<h1>&lt;T&gt;</h1>" in page
-    assert "<td>p|q `r</td>" in page
-    markdown = to_markdown("<T>", [Section(title="S & S", blocks=blocks)])
-    assert "| p\\|q `r |" in markdown
-    assert "```sh\nx > y\n```" in markdown
-
-
-@pytest.mark.parametrize(
-    "cell",
-    [
-        "two\nlines",
-        "two\r\nlines",
-        "<script>alert(1)</script>",
-        "a | b",
-        "a \\| b",
-        "``` <script> `",
-        "` <b>",
-    ],
-)
-def test_no_cell_of_markdown_tears_its_table_or_brings_html(cell: str) -> None:
-    table = Table(caption=cell, headings=("a", cell), rows=[(cell, "last")], note=cell)
-    blocks = (table, Paragraph(text=cell))
-    markdown = to_markdown("T", [Section(title="S", blocks=blocks)])
-    assert "<" not in markdown
-    rows = [line for line in markdown.split("\n") if line.startswith("| ")]
-    assert len(rows) == 3
-    for row in rows:
-        # a bar is the table's unless it is behind a backslash that is not itself behind one
-        assert len(re.findall(r"(?<!\\)(?:\\\\)*\|", row)) == 3
-    assert rows[2].endswith(" | last |")
-
-
-def test_code_in_markdown_keeps_its_angle_brackets() -> None:
-    markdown = to_markdown("T", [Section(title="S", blocks=(Paragraph(text="a < b, `c < d`"),))])
-    assert "a &lt; b, `c < d`" in markdown
-
-
-def claim(measure: Measure = Measure.SUCCESS) -> Claim:
-    return Claim(
-        suite="thin", measure=measure, better=("DHRNet", "MP-PC"), worse=("DHRNet", "MVP"), source="here"
-    )
-
-
-@pytest.mark.parametrize(
-    ("better", "worse", "verdict"),
-    [
-        ("1" * 20, "0" * 20, Verdict.CONFIRMED),
-        ("0" * 20, "1" * 20, Verdict.CONTRADICTED),
-        ("11110" * 4, "01111" * 4, Verdict.NOT_CONFIRMED),
-        ("1" * 20, "1" * 16 + "0" * 4, Verdict.NOT_CONFIRMED),
-        ("xxxx", "1111", Verdict.ABSENT),
-    ],
-)
-def test_a_claim_is_confirmed_only_by_a_significant_difference(
-    better: str, worse: str, verdict: Verdict
-) -> None:
-    (found,) = evaluate(by_cell([*lines(better), *lines(worse, controller="mvp")]), [claim()])
-    assert found.verdict is verdict
-
-
-def test_p_is_corrected_over_the_claims_that_could_be_tested() -> None:
-    cells = by_cell([*lines("1" * 8), *lines("0" * 8, controller="mvp")])
-    once = evaluate(cells, [claim()])[0]
-    assert once.p == once.p_holm == pytest.approx(2 / 2**8)
-    absent = Claim(
-        suite="single",
-        measure=Measure.SUCCESS,
-        better=("DHRNet", "MP-PC"),
-        worse=("GG-CNN", "MP-PC"),
-        source="",
-    )
-    both = evaluate(cells, [claim(), absent, claim(Measure.REFLEX)])
-    assert both[0].p_holm == pytest.approx(4 / 2**8)
-    assert both[1].absent == "suite single absent"
-
-
-@pytest.mark.parametrize("measure", [Measure.SUCCESS, Measure.TIME])
-@pytest.mark.parametrize(
-    ("n", "verdict"), [(3, Verdict.UNDECIDABLE), (5, Verdict.UNDECIDABLE), (6, Verdict.CONFIRMED)]
-)
-def test_a_claim_cannot_be_decided_where_no_outcome_would_be_significant(
-    measure: Measure, n: int, verdict: Verdict
-) -> None:
-    # better in every world: the smallest p there is, 2 / 2^n
-    best = [*lines("1" * n, time_limit_s=100.0), *lines("0" * n, controller="mvp", time_limit_s=100.0)]
-    (found,) = evaluate(by_cell(best), [claim(measure)])
-    assert (found.verdict, found.agrees) == (verdict, True)
-    assert found.p == pytest.approx(2 / 2**n)
-
-
-def test_what_cannot_be_decided_is_counted_apart_and_no_part_of_the_correction() -> None:
-    few = [*lines("111", suite="stacked"), *lines("000", suite="stacked", controller="mvp")]
-    cells = by_cell([*lines("1" * 6), *lines("0" * 6, controller="mvp"), *few])
-    stacked = replace(claim(), suite="stacked")
-    decided, open_one = evaluate(cells, [claim(), stacked])
-    assert decided.p_holm == decided.p
-    assert decided.verdict is Verdict.CONFIRMED
-    assert np.isnan(open_one.p_holm)
-    text, table = hypothesis_blocks([decided, open_one])
-    assert isinstance(text, Paragraph)
-    assert isinstance(table, Table)
-    assert "1 confirmed, 1 cannot be decided" in text.text
-    assert "from 6 worlds on" in text.text
-    assert [row[-2:] for row in table.rows] == [("0.0312", "confirmed"), ("-", "cannot be decided")]
-    (alone,) = (block for block in hypothesis_blocks([decided]) if isinstance(block, Paragraph))
-    assert "worlds" not in alone.text
-
-
-def test_times_are_compared_in_pairs_and_whoever_failed_took_the_limit() -> None:
-    fast = lines("1" * 8, time_limit_s=100.0)
-    slow = [{**line, "sim_time_s": line["sim_time_s"] + 1} for line in lines("1" * 8, controller="mvp")]
-    (found,) = evaluate(by_cell([*fast, *slow]), [claim(Measure.TIME)])
-    assert found.p == pytest.approx(2 / 2**8)  # all eight signs alike
-    assert found.verdict is Verdict.CONFIRMED
-    assert found.worse - found.better == pytest.approx(1.0)
-    gave_up = [{**line, "success": False, "sim_time_s": 1.0} for line in fast]
-    (found,) = evaluate(by_cell([*gave_up, *slow]), [claim(Measure.TIME)])
-    assert found.better == 100.0
-    assert found.verdict is Verdict.CONTRADICTED
-
-
-def test_reflexes_and_drift_count_less_as_better() -> None:
-    stopped = [
-        {**line, "reflex": {"limit": "joint_velocity"}, "blind_drift_m": 0.2} for line in lines("0" * 9)
-    ]
-    calm = lines("1" * 9, controller="mvp")
-    for found in evaluate(by_cell([*stopped, *calm]), [claim(Measure.REFLEX), claim(Measure.DRIFT)]):
-        assert found.verdict is Verdict.CONTRADICTED
-    old = [{k: v for k, v in line.items() if k != "blind_drift_m"} for line in calm]
-    (found,) = evaluate(by_cell([*stopped, *old]), [claim(Measure.DRIFT)])
-    assert found.verdict is Verdict.ABSENT
-
-
-def test_claims_agree_with_the_papers_own_tables() -> None:
-    for item in CLAIMS:
-        if item.measure is Measure.SUCCESS:
-            (k, n), (j, m) = (reported(item.suite)[side] for side in (item.better, item.worse))
-            assert k / n > j / m
-        elif item.measure is Measure.TIME:
-            seconds = dict(zip(CELLS, STACKED, strict=True))
-            assert seconds[item.better] < seconds[item.worse]
-    assert len(CLAIMS) == len(set(CLAIMS))
-    assert reported("unseen")["DHRNet", "MP-PC"] == (36, 40)
-    assert reported("mine") == {}
-
-
-def test_a_trace_is_read_as_it_was_recorded(tmp_path: Path) -> None:
-    (line,) = lines("0")
-    trace(tmp_path, line)
-    found = read_trace(tmp_path, "thin-dhrnet-mppc-0000", line)
-    assert found is not None
-    np.testing.assert_allclose(found.times, np.arange(30) / 10, atol=1e-6)
-    np.testing.assert_allclose(found.positions[-1], [0.558, 0.0, 0.355], atol=1e-6)
-    assert found.singular_values[0] == pytest.approx(0.2)
-    assert found.entropy is not None
-    assert found.entropy[0, 0] == pytest.approx(2.9, abs=1e-2)
-    assert len(found.stills) == len(found.still_times) == 6
-    assert found.still_phases[0] == "reach"
-    assert found.still_phases[-1] == "lift"
-    assert all(still[:4] == b"RIFF" for still in found.stills)
-    assert read_trace(tmp_path, "thin-dhrnet-mppc-0000", {**line, "success": True}) is None
-    assert read_trace(tmp_path, "thin-dhrnet-mppc-0000", {**line, "state_hash": "x"}) is None
-
-
-def test_the_same_traces_are_kept_in_whatever_order_episodes_end(tmp_path: Path) -> None:
-    episodes = lines("0" * KEPT + "0110")
-    orders = (range(len(episodes)), reversed(range(len(episodes))))
-    for folder, order in zip((tmp_path / "a", tmp_path / "b"), orders, strict=True):
-        for k in order:
-            trace(folder, episodes[k], ticks=3)
-        prune_traces(folder)
-    kept = {path.name: path.read_bytes() for path in (tmp_path / "a").iterdir()}
-    assert kept.keys() == {path.name for path in (tmp_path / "b").iterdir()}
-    name = "thin-dhrnet-mppc-{:04d}-{}.npz"
-    ways = {name.format(k, "failure") for k in range(KEPT)} | {name.format(KEPT + 1, "success")}
-    stills = {name.format(0, "failure-stills"), name.format(KEPT + 1, "success-stills")}
-    assert kept.keys() == ways | stills
-
-
-def test_an_episode_that_ends_otherwise_replaces_its_trace(tmp_path: Path) -> None:
-    (line,) = lines("0")
-    trace(tmp_path, line, ticks=3)
-    trace(tmp_path, {**line, "success": True}, ticks=3)
-    assert {path.name.rpartition("-0000-")[2] for path in tmp_path.iterdir()} == {
-        "success.npz", "success-stills.npz",
-    }  # fmt: skip
-
-
-def test_a_long_episode_is_thinned_out_evenly(tmp_path: Path) -> None:
-    (line,) = lines("1")
-    trace(tmp_path, line, ticks=9000)
-    found = read_trace(tmp_path, "thin-dhrnet-mppc-0000", line)
-    assert found is not None
-    assert len(found.times) <= 4001
-    assert np.ptp(np.diff(found.times)) < 1e-3
-    assert found.still_times[0] == 0.0
-    assert found.still_times[-1] == pytest.approx(899.9, abs=30)
-
-
-def test_traces_that_cannot_be_written_are_an_output_error(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="a trace cannot be written"):
-        trace(tmp_path / "file" / "traces", lines("1")[0], ticks=2)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "False", done.stderr

@@ -3,42 +3,51 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from bench_runs import clearing_row, configuration_row, error_row, grasp_row, run_row
 
-from mpgrasp.bench.analysis.summary import paired_tests, summarise
-from mpgrasp.bench.results.reader import read_lines
+from mpgrasp.bench.analysis.summary import RunSummary
+from mpgrasp.bench.record import line_of, record_of
+from mpgrasp.bench.results.reader import read_lines, read_run, read_summary
+from mpgrasp.bench.results.run_card import RunDescription
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.json_values import one_line
 
-RUN = {"configuration": {"suite": {}, "seed": 0}}
-WHICH = {"suite": "thin", "episode": 0, "detector": "d", "controller": "c"}
-LINE = {**WHICH, "seed": 0, "scene_seed": 1, "outcome": "success", "success": True}
-LINE |= {"object": "key", "sim_time_s": 5.0, "reflex": None, "state_hash": "0"}
+RUN = record_of(RunDescription, run_row())
+LINE = line_of(grasp_row())
+SUMMARY = RunSummary(complete=True, cells=(), paired_tests=())
 
 
 def test_a_run_directory_holds_every_line_at_once(tmp_path: Path) -> None:
     directory = RunDirectory.create(tmp_path / "a" / "b", RUN)
     for k in range(3):
-        directory.append({**LINE, "episode": k, "x": np.float64(1 / 3), "nan": float("nan")})
+        rough = {"jerk_rms": float(np.float64(1 / 3)), "blind_drift_m": float("nan")}
+        directory.append(line_of(grasp_row(episode=k, **rough)))
         assert len(directory.episodes_file.read_bytes().splitlines()) == k + 1
-    assert directory.episodes()[0] == {**LINE, "episode": 0, "x": 0.333333333, "nan": None}
-    directory.write_summary({"complete": True, "cells": [{"n": 3}]})
-    assert json.loads((directory.path / "summary.json").read_text()) == {
-        "complete": True,
-        "cells": [{"n": 3}],
-    }
+    assert directory.episodes()[0] == line_of(grasp_row(episode=0, jerk_rms=0.333333333))
+    directory.write_summary(SUMMARY)
+    assert read_summary(directory.path) == SUMMARY
+    assert read_run(directory.path) == RUN
+
+
+def test_the_traceback_of_an_error_lies_in_a_file_of_its_own(tmp_path: Path) -> None:
+    directory = RunDirectory.create(tmp_path, RUN)
+    directory.append(line_of(error_row(traceback="line 1\nline 2\n")))
+    assert directory.episodes() == [line_of(error_row(traceback="errors/s-d-c-0000.txt"))]
+    assert (tmp_path / "errors" / "s-d-c-0000.txt").read_text() == "line 1\nline 2\n"
 
 
 def test_a_directory_with_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
     first = RunDirectory.create(tmp_path, RUN)
-    first.append({"episode": 0})
+    first.append(LINE)
     first.close()
     before = {path: path.read_bytes() for path in tmp_path.glob("*.json*")}
     with pytest.raises(OutputError, match=r"another run \(seed: 0 there, 1 here\)"):
-        RunDirectory.create(tmp_path, {"configuration": {"suite": {}, "seed": 1}})
+        RunDirectory.create(tmp_path, record_of(RunDescription, run_row(configuration_row(seed=1))))
     assert {path: path.read_bytes() for path in tmp_path.glob("*.json*")} == before
 
 
@@ -46,8 +55,8 @@ def test_a_complete_run_again_starts_afresh_and_keeps_the_lines_of_every_time(tm
     for k in range(3):
         directory = RunDirectory.create(tmp_path, RUN)
         assert directory.episodes() == []
-        directory.append({**LINE, "sim_time_s": float(k)})
-        directory.write_summary({"complete": True})
+        directory.append(line_of(grasp_row(sim_time_s=float(k))))
+        directory.write_summary(SUMMARY)
         directory.close()
     kept = {
         file.name: json.loads(file.read_text())["sim_time_s"] for file in tmp_path.glob("episodes*.jsonl")
@@ -59,14 +68,17 @@ def test_a_complete_run_again_starts_afresh_and_keeps_the_lines_of_every_time(tm
     }
 
 
-@pytest.mark.parametrize("summary", [None, '{"complete": false}', "{", "[]"])
+UNFINISHED = '{"complete": false, "cells": [], "paired_tests": []}'
+
+
+@pytest.mark.parametrize("summary", [None, UNFINISHED, '{"complete": true}', "{", "[]"])
 @pytest.mark.parametrize("planned", [3, None])
 def test_an_unfinished_run_is_not_begun_anew(
     tmp_path: Path, summary: str | None, planned: int | None
 ) -> None:
     first = RunDirectory.create(tmp_path, RUN)
     first.append(LINE)
-    first.append({**LINE, "episode": 1, "outcome": "error", "error": "a bug", "traceback": "..."})
+    first.append(line_of(error_row(episode=1)))
     first.close()
     if summary is not None:
         (tmp_path / "summary.json").write_text(summary)
@@ -85,42 +97,77 @@ def test_a_run_that_came_to_no_episode_is_begun_anew_and_leaves_nothing_aside(tm
     assert not list(tmp_path.glob("episodes.previous*"))
 
 
+def without(row: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if name != key}
+
+
 @pytest.mark.parametrize(
-    ("line", "lacking"),
+    ("row", "reason"),
     [
-        (WHICH, "seed, scene_seed, outcome, success, object, sim_time_s, reflex, state_hash"),
-        ({key: item for key, item in LINE.items() if key != "success"}, "success"),
-        ({key: item for key, item in LINE.items() if key != "state_hash"}, "state_hash"),
-        ({**LINE, "outcome": "error"}, "error"),
-        ({**LINE, "picks": []}, "failures, in_basket, knocked_off, left"),
+        (without(grasp_row(), "suite"), "missing required field `suite`"),
+        (without(grasp_row(), "blind_drift_m"), "missing required field `blind_drift_m`"),
+        (without(error_row(), "error"), "missing required field `error`"),
+        (without(clearing_row(), "knocked_off"), "missing required field `knocked_off`"),
+        (grasp_row(colour="red"), "unknown field `colour`"),
+        (grasp_row(picks=[]), "missing required field"),
+        (error_row(object="key"), "unknown field `object`"),
+        (grasp_row(episode="0"), r"Expected `int`, got `str` - at `\$\.episode`"),
+        (grasp_row(outcome="sucess"), r"Invalid enum value 'sucess' - at `\$\.outcome`"),
+        (grasp_row(reflex={"limit": "force"}), r"missing required field `joint` - at `\$\.reflex`"),
+        (clearing_row(picks=[{"outcome": "success"}]), r"missing required field .* - at `\$\.picks\[0\]`"),
     ],
 )
 @pytest.mark.parametrize("place", [0, 1])
-def test_a_line_without_a_key_that_all_have_is_refused_by_file_number_and_key(
-    tmp_path: Path, line: dict, lacking: str, place: int
+def test_a_line_with_a_key_too_many_or_too_few_or_of_another_type_is_refused_by_file_and_number(
+    tmp_path: Path, row: dict[str, Any], reason: str, place: int
 ) -> None:
-    texts = [one_line(LINE)]
-    texts.insert(place, one_line(line))
+    texts = [one_line(grasp_row())]
+    texts.insert(place, one_line(row))
     (tmp_path / "episodes.jsonl").write_text("".join(texts))
-    with pytest.raises(OutputError, match=rf"episodes\.jsonl, line {place + 1} .*: it lacks {lacking}; got"):
+    with pytest.raises(OutputError, match=rf"episodes\.jsonl, line {place + 1} is not .*{reason}"):
         read_lines(tmp_path)
 
 
-def test_a_line_with_these_keys_alone_is_enough_for_tables_and_pairs(tmp_path: Path) -> None:
-    error = {**WHICH, "episode": 1, "seed": 0, "scene_seed": 2, "outcome": "error", "success": None}
-    texts = [one_line(line) for line in (LINE, {**error, "error": "a bug"})]
-    (tmp_path / "episodes.jsonl").write_text("".join(texts))
-    lines = read_lines(tmp_path).lines
-    (cell,) = summarise(lines)
-    assert (cell["n"], cell["errors"], cell["successes"]) == (1, 1, 1)
-    assert paired_tests([*lines, {**LINE, "controller": "other"}])[0]["n"] == 1
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{}", "not json"])
-def test_a_directory_with_an_unreadable_run_is_refused(tmp_path: Path, content: str) -> None:
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "Expecting value"),
+        ("not json", "Expecting value"),
+        ("[]", "Expected `object`, got `array`"),
+        ("{}", "missing required field `format`"),
+        (json.dumps(run_row(format=2)), r"Invalid enum value 2 - at `\$\.format`"),
+        (json.dumps(run_row(colour="red")), "unknown field `colour`"),
+        (json.dumps(run_row(configuration_row(colour="red"))), r"`colour` - at `\$\.configuration`"),
+        (json.dumps(run_row(configuration_row(suites=[]))), "missing required field `suite`"),
+        (json.dumps(run_row(configuration_row(suite="paper", suites=[]))), "programme with `suites`"),
+        (json.dumps(run_row(configuration_row(suite="paper"))), "programme with `suites`"),
+    ],
+)
+def test_an_unusable_run_json_is_refused_by_name_and_reason(
+    tmp_path: Path, content: str, reason: str
+) -> None:
     (tmp_path / "run.json").write_text(content)
-    with pytest.raises(OutputError, match=r"run\.json cannot be read"):
+    with pytest.raises(OutputError, match=rf"run\.json cannot be used.*{reason}"):
+        read_run(tmp_path)
+    with pytest.raises(OutputError, match=r"another run \(.*run\.json cannot be used"):
         RunDirectory.create(tmp_path, RUN)
+    assert (tmp_path / "run.json").read_text() == content
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("{", "Expecting"),
+        ('{"complete": true}', "missing required field `cells`"),
+        ('{"complete": true, "cells": [], "paired_tests": [], "more": 1}', "unknown field `more`"),
+        ('{"complete": true, "cells": [{"suite": "s"}], "paired_tests": []}', r"at `\$\.cells\[0\]`"),
+    ],
+)
+def test_an_unusable_summary_is_refused_by_name_and_reason(tmp_path: Path, content: str, reason: str) -> None:
+    assert read_summary(tmp_path) is None
+    (tmp_path / "summary.json").write_text(content)
+    with pytest.raises(OutputError, match=rf"summary\.json cannot be used.*{reason}"):
+        read_summary(tmp_path)
 
 
 def test_a_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
@@ -136,4 +183,4 @@ def test_a_full_disk_is_an_output_error(tmp_path: Path) -> None:
     directory = RunDirectory.create(tmp_path, RUN)
     directory._episodes = os.open("/dev/full", os.O_WRONLY)
     with pytest.raises(OutputError, match="No space left"):
-        directory.append({"episode": 0})
+        directory.append(LINE)

@@ -15,7 +15,8 @@ from typing import Any
 import pytest
 
 from mpgrasp.bench.analysis.summary import paired_tests, summarise
-from mpgrasp.files.json_values import plain
+from mpgrasp.bench.record import Cell, played
+from mpgrasp.bench.results.reader import read_lines
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -141,17 +142,15 @@ def assert_alike(ours: Any, published: Any, where: str = "") -> None:
 
 @pytest.mark.parametrize("path", sorted(RESULTS.rglob("summary.json")), ids=folder_of)
 def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
-    text = (path.parent / "episodes.jsonl").read_text(encoding="utf-8")
-    lines = [json.loads(line) for line in text.splitlines()]
+    lines = read_lines(path.parent).lines
     summary = json.loads(path.read_text(encoding="utf-8"))
     for key, found in (("cells", summarise(lines)), ("paired_tests", paired_tests(lines))):
-        assert_alike(plain(found), summary[key], key)
-    which = ("suite", "detector", "controller")
-    played = [line for line in lines if line["outcome"] != "error"]
-    counts = Counter(tuple(line[key] for key in which) for line in played)
-    successes = Counter(tuple(line[key] for key in which) for line in played if line["success"])
-    worlds = {(*(line[key] for key in which), line["scene_seed"]) for line in played}
-    assert len(worlds) == len(played)
-    cells = {tuple(cell[key] for key in which): cell for cell in summary["cells"]}
+        assert_alike([row.as_row() for row in found], summary[key], key)
+    finished = played(lines)
+    counts = Counter(line.task.cell for line in finished)
+    successes = Counter(line.task.cell for line in finished if line.success)
+    worlds = {(line.task.cell, line.scene_seed) for line in finished}
+    assert len(worlds) == len(finished)
+    cells = {Cell(cell["suite"], cell["detector"], cell["controller"]): cell for cell in summary["cells"]}
     assert {key: cell["n"] for key, cell in cells.items() if cell["n"]} == counts
     assert {key: cell["successes"] for key, cell in cells.items() if cell["successes"]} == successes
