@@ -11,7 +11,7 @@ import pytest
 from mpgrasp.bench.playing.world_card import physics_card, world_card
 from mpgrasp.bench.results.run_card import WorldCard
 from mpgrasp.camera.noise import DepthNoise
-from mpgrasp.episode import episode as played
+from mpgrasp.episode import world as built
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.motion import arm_driver
 from mpgrasp.motion.ik import DifferentialIK
@@ -32,7 +32,7 @@ def card(**changes: Any) -> WorldCard:
 def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_camera(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def other_driver(simulation: Any) -> arm_driver.ArmDriver:
+    def other_driver(simulation: Any, *_: object) -> arm_driver.ArmDriver:
         return arm_driver.ArmDriver(
             simulation,
             MotionConfig(max_speed=0.123),
@@ -40,8 +40,8 @@ def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_ca
             ReflexMonitor(ReflexConfig(contact_force=12.3)),
         )
 
-    monkeypatch.setattr(played, "ArmDriver", other_driver)
-    monkeypatch.setattr(played, "DepthNoise", lambda: DepthNoise(subpixel=0.123))
+    monkeypatch.setattr(built, "ArmDriver", other_driver)
+    monkeypatch.setattr(built, "DepthNoise", lambda: DepthNoise(subpixel=0.123))
     found = card()
     assert found.motion["max_speed"] == 0.123
     assert found.ik["damping"] == 0.0123
@@ -49,11 +49,11 @@ def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_ca
     assert found.camera["noise"]["subpixel"] == 0.123
 
 
-def test_the_camera_of_the_card_is_that_of_the_frames() -> None:
+def test_the_camera_of_the_card_is_the_whole_sensor_whatever_the_crop() -> None:
     found = card(noise=False, camera_crop=300)
     assert found.camera["backend"] == "ray"
     assert found.camera["noise"] is None
-    assert (found.camera["intrinsics"]["width"], found.camera["intrinsics"]["height"]) == (300, 300)
+    assert (found.camera["intrinsics"]["width"], found.camera["intrinsics"]["height"]) == (640, 480)
 
 
 def test_physics_are_those_of_the_compiled_model() -> None:
