@@ -5,17 +5,10 @@ To be played by `python -m mpgrasp.bench stacked --controller benchmarks.control
 
 from __future__ import annotations
 
-from mpgrasp.controllers.mppc import Mppc
-from mpgrasp.controllers.mvp import Mvp
-from mpgrasp.grasp import Grasp
+from mpgrasp.controllers.mppc import MppcRobust
 
 
-class MppcByMean(Mppc, Mvp):
-    """Moves as MP-PC does, attenuated where nothing is seen, and grasps as MVP does: at the grid map's best
-    cell, whose quality is the mean of all views (eq. 6), not at the best pixel of any one view.
-    """
+class MppcByMean(MppcRobust):
+    """`mppc_robust`, by the name that published runs know it by."""
 
     name = "mppc_by_mean"
-
-    def final_grasp(self) -> Grasp | None:
-        return Mvp.final_grasp(self)

@@ -25,7 +25,7 @@ import study
 from reliability import calibration, choose_threshold, draw_peaks, draw_reliability
 from single_view import Trial, execute, propose
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.training.data.views import CAMERA_HEIGHT
 from mpgrasp.training.dataset import GraspDataset
 
@@ -171,7 +171,7 @@ def _study(command: Sequence[str]) -> None:
     results = {"scenes": len(chosen), "views": len(images), **analyse(trials, options.seed)}
     rows = [asdict(trial) for trial in trials]
     about = study.about(
-        "held_out", command, data=dataset.description(), peak_threshold=MppcConfig().peak_threshold,
+        "held_out", command, data=dataset.description(), peak_threshold=ReachConfig().peak_threshold,
         seed=options.seed, **who,
     )  # fmt: skip
     study.publish(options.out, "held-out", about, results, rows, draw(results))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import study
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.geometry import FloatArray
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def choose_threshold(trials: Sequence[Trial], rng: np.random.Generator) -> dict[
             }
         )
     careful = next((p for p in curve if p["wrong_of_passing"]["wilson_high"] <= FALSE_SHARE), None)
-    default = min(curve, key=lambda p: abs(p["threshold"] - MppcConfig().peak_threshold))
+    default = min(curve, key=lambda p: abs(p["threshold"] - ReachConfig().peak_threshold))
     return {
         **curve[best],
         "low": float(low),

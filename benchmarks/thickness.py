@@ -38,7 +38,7 @@ from study import (
 
 from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.camera.wrist_camera import WristCamera
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.depth import CROP
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.exceptions import ConfigError
@@ -106,7 +106,7 @@ def run(study: Study, detectors: Detectors) -> list[dict[str, Any]]:
 
 def _look(study: Study, k: int, thickness: float, detectors: Detectors, bare: bool) -> list[Sighting]:
     """Sightings in scene k with a stick of that thickness [mm] and, if `bare`, without it as well."""
-    seed, threshold = study.scene_seed(k), MppcConfig().peak_threshold
+    seed, threshold = study.scene_seed(k), ReachConfig().peak_threshold
     box = Part(shape="box", size=(LENGTH / 2, WIDTH / 2, thickness / 2000))
     stick = ObjectModel(name="stick", parts=(box,), mass=DENSITY * box.volume)
     config = SceneConfig(objects=(stick,), half_extent=REGION, cloth_unevenness=UNEVENNESS)
@@ -201,7 +201,7 @@ def _study(command: Sequence[str]) -> None:
     study = Study(scenes=options.scenes, seed=options.seed, camera=options.camera)
     detectors, who = load_detectors(options.detector)
     told = about(
-        "thickness", command, study=study, peak_threshold=MppcConfig().peak_threshold,
+        "thickness", command, study=study, peak_threshold=ReachConfig().peak_threshold,
         scene_seeds=[study.scene_seed(k) for k in range(study.scenes)], **who,
     )  # fmt: skip
     prepare(options.out)

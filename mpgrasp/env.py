@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
 from mpgrasp.camera.rasteriser import FAR
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
@@ -81,7 +81,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         suite: str | Suite = "thin",
         detector: str | GraspDetector = "oracle",
         config: EpisodeConfig | None = None,
-        controller: MppcConfig | None = None,
+        controller: ReachConfig | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):

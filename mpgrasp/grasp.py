@@ -80,10 +80,13 @@ class GraspMap:
     """(4, 4)"""
     time: float = 0.0
     """Simulated time of the image [s]."""
+    measured: NDArray[np.bool_] | None = None
+    """(H, W), True where the camera had a return and False where the depth was filled in; None if unknown."""
 
     def __post_init__(self) -> None:
         shape = (self.intrinsics.height, self.intrinsics.width)
-        for name in ("quality", "angle", "width", "depth"):
+        arrays = ("quality", "angle", "width", "depth", *(() if self.measured is None else ("measured",)))
+        for name in arrays:
             if getattr(self, name).shape != shape:
                 raise ConfigError(
                     f"grasp map's {name} has the wrong size",

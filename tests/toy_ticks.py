@@ -11,7 +11,8 @@ from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.geometry import looking_down
 from mpgrasp.grasp import GraspMap
 
-REACHING = ["mppc", "mvp"]
+REACHING = ["mppc", "mvp", "mppc_robust", "mvp_robust"]
+ROBUST = ["mppc_robust", "mvp_robust"]
 OBJECT = Blob(x=0.55, y=0.08)
 NOTHING = Blob(x=0.5, y=0.0, quality=lambda height: 0.0)
 THIN = Blob(x=0.53, y=0.05, quality=lambda height: 0.8 if height < 0.42 else 0.0)

@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING
 from mpgrasp.exceptions import ConfigError
 
 if TYPE_CHECKING:
-    from mpgrasp.controllers.config import MppcConfig
+    from mpgrasp.controllers.config import ReachConfig
     from mpgrasp.controllers.controller import Controller
 
 CONTROLLERS: dict[str, str] = {
     "mppc": "mpgrasp.controllers.mppc:Mppc",
     "mvp": "mpgrasp.controllers.mvp:Mvp",
+    "mppc_robust": "mpgrasp.controllers.mppc:MppcRobust",
+    "mvp_robust": "mpgrasp.controllers.mvp:MvpRobust",
     "open_loop": "mpgrasp.controllers.open_loop:OpenLoop",
 }
 """Import path of each controller; it is loaded when it is made."""
 
 
-def make_controller(name: str, config: MppcConfig | None = None) -> Controller:
-    """Return a controller by its name, with the settings of the preset "paper" unless others are given.
+def make_controller(name: str, config: ReachConfig | None = None) -> Controller:
+    """Return a controller by its name, with its own settings unless others are given.
 
     Raises:
         ConfigError: there is no controller of that name.

@@ -1,11 +1,15 @@
 """World cells that fuse the grasp maps of many views (eq. 6-9).
 
 Each cell counts what was seen inside it: how often which quality, and which quality together with which
-angle. Reference: Morrison et al., Multi-View Picking, ICRA 2019, whose grid this is. Three things differ
-from the published code: points outside of the grid are dropped, never clipped onto its border; the mean
-quality is that of the observations alone, without the prior, and a cell's rank grows with the number of
-its observations, so that a cell that was hardly seen is never the best; and width and surface height are
-weighted by quality (the paper's text under eq. 7 asks for it), because a detector says nothing useful
+angle. Reference: Morrison et al., Multi-View Picking, ICRA 2019, whose grid this is. By default it is the
+published one: the mean quality is that of observations and prior, so that a cell that was hardly seen has a
+mean near 0.5 and beats an object that is claimed weakly; cells of the border are never the best; width and
+surface height are plain means (eq. 9). One thing differs from the published code: points outside of the
+grid are dropped, where that code clips them onto the border's cells.
+
+`ROBUST_GRID` is this project's own: the mean is that of the observations alone; a cell's rank grows with
+the number of its observations, so that a cell that was hardly seen is never the best; and width and height
+are weighted by quality (the paper's text under eq. 7 asks for it), because a detector says nothing useful
 about the width where it sees no grasp, and a cell at an object's edge also holds points of the table.
 """
 
@@ -45,9 +49,19 @@ class GridConfig:
     """Points lower than this are noise [m]; a little below the table, or half of its points would go."""
     z_ceiling: float = 0.17
     """Points higher than this are noise [m]."""
-    evidence: float = 20.0
+    prior_count: float = 1.0
+    """Count that every (angle, quality) bin starts with: it makes unseen cells the most uncertain ones."""
+    prior_in_mean: bool = True
+    """True if the mean quality includes the prior, as in published code; False for the observations alone."""
+    evidence: float = 0.0
     """Observations after which a cell's mean quality counts half in the search for the best cell; three
-    views from the start height bring about as many. 0 ranks by the mean alone."""
+    views from the start height bring about 20. 0 ranks by the mean alone, as published code does."""
+    border_counts: bool = False
+    """True if a cell on the border can be the best one; False, as in published code, if its mean is 0."""
+    weighted: bool = False
+    """True if a cell's width and surface height are means weighted by quality, False for plain means."""
+    filled_counts: bool = False
+    """True if pixels without a return, whose depth the detector filled in, count as seen."""
     failure_sigma: float = 0.0075
     """Radius (1 sigma) around a failed grasp within which quality is lowered [m]."""
 
@@ -58,11 +72,11 @@ class GridConfig:
             raise ConfigError("too few bins", got=(self.n_quality, self.n_angle), allowed="2 or more each")
         if self.z_floor >= self.z_ceiling:
             raise ConfigError("floor above ceiling", got=self.z_floor, allowed=f"below {self.z_ceiling}")
-        if self.evidence < 0 or self.failure_sigma <= 0:
+        if not (self.evidence >= 0 and self.failure_sigma > 0 and self.prior_count >= 0):
             raise ConfigError(
                 "unusable grid weights",
-                got=(self.evidence, self.failure_sigma),
-                allowed="evidence >= 0, sigma > 0",
+                got=(self.evidence, self.failure_sigma, self.prior_count),
+                allowed="evidence >= 0, failure_sigma > 0, prior_count >= 0",
             )
 
     @property
@@ -70,6 +84,12 @@ class GridConfig:
         """(ny, nx) cells."""
         n = max(1, round(self.extent / self.cell))
         return n, n
+
+
+ROBUST_GRID = GridConfig(
+    prior_in_mean=False, evidence=20.0, border_counts=True, weighted=True, filled_counts=False
+)
+"""Settings of this project's grid; see the module's first lines."""
 
 
 @dataclass(eq=False)
@@ -145,9 +165,10 @@ class GridMap:
         np.add.at(self.quality_counts.reshape(-1), index * c.n_quality + q_bin, ones)
         np.add.at(self.counts.reshape(-1), (index * c.n_angle + angle_bin) * c.n_quality + q_bin, ones)
         n = self._weight.size
-        self._weight += np.bincount(index, weights=quality, minlength=n)
-        self._weighted_width += np.bincount(index, weights=quality * width, minlength=n)
-        self._weighted_height += np.bincount(index, weights=quality * z, minlength=n)
+        weight = quality if c.weighted else np.ones_like(quality)
+        self._weight += np.bincount(index, weights=weight, minlength=n)
+        self._weighted_width += np.bincount(index, weights=weight * width, minlength=n)
+        self._weighted_height += np.bincount(index, weights=weight * z, minlength=n)
         return cells
 
     def _locate(self, grasp_map: GraspMap) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
@@ -169,6 +190,8 @@ class GridMap:
             # comparisons with NaN are false: pixels without depth drop out here
             seen = (col >= 0) & (col < nx) & (row >= 0) & (row < ny) & (z >= c.z_floor) & (z <= c.z_ceiling)
             seen &= np.isfinite(grasp_map.quality + grasp_map.angle + grasp_map.width)
+            if grasp_map.measured is not None and not c.filled_counts:
+                seen &= grasp_map.measured
             cells = np.where(seen, row * nx + col, -1.0).astype(np.intp)
         return cells, z
 
@@ -177,7 +200,7 @@ class GridMap:
         return self._summary()[0]
 
     def mean_quality(self) -> FloatArray:
-        """Mean quality (ny, nx) of the observations, eq. 7, less what failures took; 0 where unseen."""
+        """Mean quality (ny, nx), eq. 7, less the part that failures took; 0 where unseen."""
         return self._summary()[1]
 
     def _summary(self) -> tuple[FloatArray, FloatArray]:
@@ -185,7 +208,16 @@ class GridMap:
             centres = self.quality_centres.astype(np.float32)
             sums = self.quality_counts @ np.column_stack([np.ones_like(centres), centres])  # (ny, nx, 2)
             n, total = sums[..., 0], sums[..., 1]
-            self._fresh = n, np.clip(total / np.maximum(n, 1) - self.failures, 0.0, 1.0)
+            mean = total / np.maximum(n, 1)
+            if self.config.prior_in_mean:
+                # the same count in every bin: their mean is 0.5
+                prior = np.float32(self.config.prior_count * self.config.n_angle * self.config.n_quality)
+                mean = np.where(n > 0, (total + prior / 2) / np.maximum(n + prior, 1), 0)
+            mean = np.clip(mean - self.failures, 0.0, 1.0)
+            if not self.config.border_counts:
+                mean[[0, -1], :] = 0
+                mean[:, [0, -1]] = 0
+            self._fresh = n, mean
         return self._fresh
 
     def mean_angle(self, cell: tuple[int, int]) -> float:
@@ -199,11 +231,11 @@ class GridMap:
         return float(wrap_half_pi(np.arctan2(s, c) / 2))
 
     def mean_width(self, cell: tuple[int, int]) -> float:
-        """Mean opening of a cell [m], eq. 9, weighted by quality; 0 where no grasp was ever seen."""
+        """Mean opening of a cell [m], eq. 9; 0 where there is nothing to take a mean of."""
         return self._weighted_mean(self._weighted_width, cell)
 
     def mean_height(self, cell: tuple[int, int]) -> float:
-        """Mean surface height of a cell [m], weighted by quality; 0 where no grasp was ever seen."""
+        """Mean surface height of a cell [m]; 0 where there is nothing to take a mean of."""
         return self._weighted_mean(self._weighted_height, cell)
 
     def _weighted_mean(self, total: FloatArray, cell: tuple[int, int]) -> float:
@@ -211,13 +243,15 @@ class GridMap:
         return float(total[flat] / self._weight[flat]) if self._weight[flat] > 0 else 0.0
 
     def best_cell(self) -> tuple[int, int] | None:
-        """The cell of the highest mean quality among those seen often enough (see `GridConfig.evidence`).
+        """Return the cell of the highest mean quality, weighted by evidence (see `GridConfig.evidence`).
 
-        None where every observation fell into the lowest quality bin: such a map says nothing.
+        None where there is no such cell. Without the prior in its mean, that is also a map in which every
+        observation fell into the lowest quality bin.
         """
         n, quality = self._summary()
         rank = quality * n / np.maximum(n + self.config.evidence, 1)
-        rank[self.quality_counts[..., 0] >= n] = 0.0
+        if not self.config.prior_in_mean:
+            rank[self.quality_counts[..., 0] >= n] = 0.0
         best = np.unravel_index(np.argmax(rank), rank.shape)
         return (int(best[0]), int(best[1])) if rank[best] > 0 else None
 

@@ -33,11 +33,11 @@ def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
     return result
 
 
-def grid_entropy(grid: GridMap, prior_count: float = 1.0) -> FloatArray:
+def grid_entropy(grid: GridMap) -> FloatArray:
     """Entropy (ny, nx) [nat] of every cell with `prior_count` per angle and quality bin, hence N_theta of
     it per quality bin; log N_q, the maximum, where nothing was seen.
     """
-    return cell_entropy(grid.quality_counts, prior_count * grid.config.n_angle)
+    return cell_entropy(grid.quality_counts, grid.config.prior_count * grid.config.n_angle)
 
 
 def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothing") -> FloatArray:

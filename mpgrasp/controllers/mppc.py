@@ -1,15 +1,13 @@
-"""MP-PC, the paper's multi-view perceptual planning controller (Algorithm 1)."""
+"""MP-PC, the paper's multi-view perceptual planning controller (Algorithm 1), and this project's robust one.
+
+Algorithm 1 exists in the paper alone: the authors' public code is the published multi-view picking code with
+a class renamed, without alpha, without exist_peak() and without the pool B.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
-
-from mpgrasp.controllers.grid_map import GridMap
+from mpgrasp.controllers.config import MPPC, MPPC_ROBUST
 from mpgrasp.controllers.reaching import ReachingController
-from mpgrasp.grasp import Grasp, GraspMap, best_pixel
 
 
 class Mppc(ReachingController):
@@ -18,35 +16,13 @@ class Mppc(ReachingController):
     """
 
     name = "mppc"
-
-    def reset(self, seed: int) -> None:
-        super().reset(seed)
-        self.pool: list[Grasp] = []
-
-    def final_grasp(self) -> Grasp | None:
-        """Line 17: the best grasp of the pool; of equals the latest, which was seen from nearest by."""
-        best = max(reversed(self.pool), key=lambda grasp: grasp.quality, default=None)
-        return best if best is not None and best.quality >= self.config.min_quality else None
-
-    def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
-        grasp = best_grasp_in_view(grasp_map, cells, self.grid)
-        if grasp is not None:
-            self.pool.append(grasp)
-
-    def _attenuation(self, peak: bool) -> float:
-        return 1.0 if peak else self.config.alpha
+    defaults = MPPC
 
 
-def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:
-    """Lines 11-14: the grasp of the best pixel whose point lies in the workspace; None where none does.
-
-    `cells` (H, W) is what `GridMap.update` returned for this view. Quality is lowered around remembered
-    failures.
+class MppcRobust(ReachingController):
+    """Attenuates as MP-PC does, on the robust grid, and grasps at that grid's best cell: the mean of all
+    views is less often too good to be true than the best pixel of any one view.
     """
-    if (cells < 0).all():
-        return None
-    quality = grasp_map.quality
-    if grid.failures.any():
-        quality = quality - grid.failures.ravel()[cells]
-    row, col = best_pixel(np.where(cells >= 0, quality, -np.inf))
-    return replace(grasp_map.grasp_at(row, col), quality=float(np.clip(quality[row, col], 0.0, 1.0)))
+
+    name = "mppc_robust"
+    defaults = MPPC_ROBUST

@@ -1,4 +1,4 @@
-"""MVP, the baseline: multi-view picking without attenuation, which grasps at the grid map's best cell.
+"""MVP, the baseline: multi-view picking as it was published, and on this project's robust grid.
 
 Reference: Morrison et al., Multi-View Picking: Next-best-view Reaching for Improved Grasping in Clutter,
 ICRA 2019.
@@ -6,25 +6,19 @@ ICRA 2019.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mpgrasp.controllers.config import MVP, MVP_ROBUST
 from mpgrasp.controllers.reaching import ReachingController
-from mpgrasp.grasp import Grasp, GraspMap
 
 
 class Mvp(ReachingController):
-    """Follows the utility at full speed whatever the detector sees."""
+    """Follows the utility at full speed whatever the detector sees, and grasps at the grid's best cell."""
 
     name = "mvp"
+    defaults = MVP
 
-    def final_grasp(self) -> Grasp | None:
-        """Eq. 6 of the cell with the highest mean quality."""
-        best = self.grid.best_grasp()
-        return best if best is not None and best.quality >= self.config.min_quality else None
 
-    def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
-        """All that MVP knows is in the grid."""
+class MvpRobust(ReachingController):
+    """The same on the robust grid, which does not take a cell that was hardly seen for a good one."""
 
-    def _attenuation(self, peak: bool) -> float:
-        return 1.0
+    name = "mvp_robust"
+    defaults = MVP_ROBUST

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import MVP_ROBUST, ReachConfig
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.grid_map import GridMap
-from mpgrasp.controllers.mppc import best_grasp_in_view
+from mpgrasp.controllers.reaching import best_grasp_in_view
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, peak_height
 
@@ -17,8 +17,8 @@ class OpenLoop:
 
     name = "open_loop"
 
-    def __init__(self, config: MppcConfig | None = None) -> None:
-        self.config = config or MppcConfig()
+    def __init__(self, config: ReachConfig | None = None) -> None:
+        self.config = config or MVP_ROBUST
         self.reset(0)
 
     def reset(self, seed: int) -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.controllers.information import exploration_cost, grid_entropy, information_gain, utility
 from mpgrasp.geometry import FloatArray, wrap_half_pi, wrap_pi
-from mpgrasp.grasp import Grasp, GraspMap, peak_height
+from mpgrasp.grasp import Grasp, GraspMap, best_pixel, peak_height
 
 _TIE = 1e-3
 """Utilities closer to the best than this fraction of the range in the window are equally good."""
@@ -22,13 +22,20 @@ _YAW_SLACK = np.deg2rad(15)
 """Angle beyond the yaw range at which a grasp makes the hand turn the other way to meet it [rad]."""
 
 
-class ReachingController(ABC):
-    """Algorithm 1 without what tells MP-PC from MVP; those are the subclasses."""
+class ReachingController:
+    """Multi-view reaching: fuse a view, go towards the best viewpoint near by and down, grasp in the end.
+
+    Algorithm 1 with `choice` "pool" and an `alpha` below 1, multi-view picking with "grid" and 1.
+
+    Args:
+        config: settings; those of the class unless given.
+    """
 
     name: str
+    defaults: ReachConfig
 
-    def __init__(self, config: MppcConfig | None = None) -> None:
-        self.config = config or MppcConfig()
+    def __init__(self, config: ReachConfig | None = None) -> None:
+        self.config = config or self.defaults
         self.reset(0)
 
     def reset(self, seed: int) -> None:
@@ -36,6 +43,8 @@ class ReachingController(ABC):
         # where nothing tells directions apart the arm explores in a random one, and sticks to it
         heading = np.random.default_rng(seed).uniform(-np.pi, np.pi)
         self._heading = np.array([np.cos(heading), np.sin(heading)])
+        self.pool: list[Grasp] = []
+        """B of Algorithm 1: the best grasp of every view."""
         self._diagnostics: dict[str, FloatArray | float | bool] = {}
 
     def remember_failure(self, position: FloatArray) -> None:
@@ -44,7 +53,9 @@ class ReachingController(ABC):
 
     def update(self, observation: Observation) -> Command:
         config, grasp_map, tcp = self.config, observation.grasp_map, observation.T_world_tcp
-        self._look(grasp_map, self.grid.update(grasp_map))
+        cells = self.grid.update(grasp_map)
+        if config.choice == "pool" and (best := best_grasp_in_view(grasp_map, cells, self.grid)) is not None:
+            self.pool.append(best)
 
         viewpoint = grasp_map.T_world_camera[:3, 3]
         map_of_utility = self._evaluate(grasp_map, float(tcp[2, 3]))
@@ -53,12 +64,13 @@ class ReachingController(ABC):
         velocity = config.v_1 * pull / max(1.0, float(np.linalg.norm(pull)))
         height = peak_height(grasp_map.quality)
         exists = height > config.peak_threshold
-        velocity = velocity * self._attenuation(exists)
+        velocity = velocity * (1.0 if exists else config.alpha)
 
-        grasp = self.final_grasp()
+        grasp = self._enough(self.grid.best_grasp())
         yaw_rate = 0.0 if grasp is None else self._yaw_rate(grasp.angle, tcp)
         done = bool(tcp[2, 3] <= config.z_min)
-        twist = np.zeros(6) if done else np.array([*velocity, -config.v_z, 0.0, 0.0, yaw_rate])
+        descent = self._descent_speed(velocity)
+        twist = np.zeros(6) if done else np.array([*velocity, -descent, 0.0, 0.0, yaw_rate])
         self._diagnostics |= {
             "peak": exists,
             "peak_height": height,
@@ -68,30 +80,41 @@ class ReachingController(ABC):
         }
         return Command(twist=twist, gripper=config.gripper_open, done=done)
 
-    @abstractmethod
-    def final_grasp(self) -> Grasp | None: ...
+    def final_grasp(self) -> Grasp | None:
+        """Return the grasp of the grid's best cell (eq. 6), or the best of the pool (Algorithm 1, line 17).
+
+        Of equal grasps in the pool the latest counts, which was seen from nearest by.
+        """
+        if self.config.choice == "grid":
+            return self._enough(self.grid.best_grasp())
+        return self._enough(max(reversed(self.pool), key=lambda grasp: grasp.quality, default=None))
+
+    def _enough(self, grasp: Grasp | None) -> Grasp | None:
+        return grasp if grasp is not None and grasp.quality >= self.config.min_quality else None
+
+    def _descent_speed(self, horizontal: FloatArray) -> float:
+        """Speed downwards [m/s] beside a horizontal velocity (2,) [m/s]."""
+        c = self.config
+        if c.descent == "constant":
+            return c.v_z
+        return float(np.sqrt(max(c.v_1**2 - float(horizontal @ horizontal), 0.0)))
 
     def diagnostics(self) -> dict[str, FloatArray | float | bool]:
         return dict(self._diagnostics)
-
-    @abstractmethod
-    def _look(self, grasp_map: GraspMap, cells: NDArray[np.intp]) -> None:
-        """Take from one view what the grid does not; `cells` (H, W) is -1 where the grid dropped a pixel."""
-
-    @abstractmethod
-    def _attenuation(self, peak: bool) -> float:
-        """Factor of the horizontal velocity; `peak` is the answer of exist_peak()."""
 
     def _evaluate(self, grasp_map: GraspMap, height: float) -> FloatArray:
         """Utility (ny, nx) of every viewpoint at the present height, eq. 12."""
         c, k = self.config, grasp_map.intrinsics
         # a sixth of the field of view where it meets the table, in cells; mean of both image sides
         footprint = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
-        entropy = grid_entropy(self.grid, c.prior_count)
+        entropy = grid_entropy(self.grid)
         gain = information_gain(entropy, max(footprint, 0.0) / 6 / c.grid.cell, c.border)
         best = self.grid.best_cell()
         centre = None if best is None else self.grid.position(best)
-        cost = exploration_cost(self.grid, centre, (height - c.z_min) / (c.z_max - c.z_min))
+        low, high, t_z = c.z_min, c.z_max, height
+        if c.cost_heights is not None:
+            (low, high), t_z = c.cost_heights, float(grasp_map.T_world_camera[2, 3])
+        cost = exploration_cost(self.grid, centre, (t_z - low) / (high - low))
         result = utility(gain, cost, c.gamma)
         self._diagnostics = {
             "entropy": entropy,
@@ -128,3 +151,18 @@ class ReachingController(ABC):
         # within the slack the hand waits at the end of its range; the grasp itself turns the rest
         goal = float(np.clip(goal, -c.yaw_range, c.yaw_range))
         return float(np.clip(c.yaw_gain * (goal - yaw), -c.yaw_rate_max, c.yaw_rate_max))
+
+
+def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:
+    """Lines 11-14: the grasp of the best pixel whose point lies in the workspace; None where none does.
+
+    `cells` (H, W) is what `GridMap.update` returned for this view. Quality is lowered around remembered
+    failures.
+    """
+    if (cells < 0).all():
+        return None
+    quality = grasp_map.quality
+    if grid.failures.any():
+        quality = quality - grid.failures.ravel()[cells]
+    row, col = best_pixel(np.where(cells >= 0, quality, -np.inf))
+    return replace(grasp_map.grasp_at(row, col), quality=float(np.clip(quality[row, col], 0.0, 1.0)))

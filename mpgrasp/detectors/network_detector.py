@@ -147,11 +147,13 @@ class NetworkDetector:
             )
         image = central_square(frame, self.config.crop, self.weights.input.size)
         seen = says_something(frame, image)
+        measured = np.isfinite(image.depth)
         image = replace(image, depth=inpaint(image.depth))
+        nothing = replace(empty_map(image), measured=measured)
         if not seen:
-            return empty_map(image)
+            return nothing
         quality, angle, width = self.grasp_arrays(image.depth, image.rgb)
-        return replace(empty_map(image), quality=quality, angle=angle, width=width)
+        return replace(nothing, quality=quality, angle=angle, width=width)
 
     def grasp_arrays(
         self, depth: Float32, rgb: NDArray[np.uint8] | None = None

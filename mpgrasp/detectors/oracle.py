@@ -55,9 +55,11 @@ class OracleDetector:
         if self._grasps is None:
             raise ConfigError("the oracle has no scene", allowed="reset(truth) before predict")
         image = central_square(frame)
+        measured, filled = np.isfinite(image.depth), inpaint(image.depth)
         if not says_something(frame, image):
-            return empty_map(replace(image, depth=inpaint(image.depth)))
-        return grasps_in_view(self._grasps, image, known=np.isfinite(image.depth), depth=inpaint(image.depth))
+            return replace(empty_map(replace(image, depth=filled)), measured=measured)
+        seen = grasps_in_view(self._grasps, image, known=measured, depth=filled)
+        return replace(seen, measured=measured)
 
 
 def grasps_in_view(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
 from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.grasp import GraspMap, world_to_image_angle
@@ -93,7 +93,7 @@ def test_what_counts_as_what(thickness: ModuleType) -> None:
     study = thickness.Study(thicknesses=(2.0, 12.0), heights=(0.175, 0.5), scenes=3)
     detectors = {
         "perfect": Perfect(),
-        "shy": Perfect(quality=MppcConfig().peak_threshold - 0.01),
+        "shy": Perfect(quality=ReachConfig().peak_threshold - 0.01),
         "along": Perfect(turn=np.pi / 2),
         "blind": Blind(),
         "guesses": Guesses(),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import MPPC, MPPC_ROBUST, MVP, MVP_ROBUST, ReachConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import PEAK_QUALITY
 
@@ -21,6 +22,9 @@ from mpgrasp.grasp import PEAK_QUALITY
         {"gamma": np.nan},
         {"z_min": 0.6},
         {"border": "torus"},
+        {"choice": "coin"},
+        {"descent": "free fall"},
+        {"cost_heights": (0.5, 0.4)},
         {"yaw_range": 0.5},
         {"peak_threshold": -0.1},
         {"window": 0.0},
@@ -28,14 +32,28 @@ from mpgrasp.grasp import PEAK_QUALITY
 )
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
-        MppcConfig(**settings)
+        ReachConfig(**settings)
 
 
-def test_the_defaults_are_those_of_table_one() -> None:
-    c = MppcConfig()
+@pytest.mark.parametrize("c", [MVP, MPPC, MVP_ROBUST, MPPC_ROBUST])
+def test_what_table_one_says_is_common_to_all(c: ReachConfig) -> None:
     assert (c.grid.cell, c.grid.extent, c.grid.n_quality, c.grid.n_angle) == (0.005, 0.68, 10, 18)
-    assert (c.v_z, c.alpha, c.z_max, c.z_min) == (0.05, 0.2, 0.50, 0.175)
+    assert (c.v_z, c.z_max, c.z_min, c.descent) == (0.05, 0.50, 0.175, "constant")
+
+
+def test_algorithm_one_differs_from_multi_view_picking_in_attenuation_and_in_its_pool_alone() -> None:
+    assert replace(MPPC, alpha=1.0, choice="grid") == MVP
+    assert (MPPC.alpha, MPPC.choice) == (0.2, "pool")
+
+
+def test_the_robust_ones_differ_in_attenuation_alone() -> None:
+    assert replace(MPPC_ROBUST, alpha=1.0) == MVP_ROBUST
+    assert MPPC_ROBUST.alpha == 0.2
+
+
+def test_the_published_cost_is_a_fifth_of_a_nat_for_every_fifteen_centimetres() -> None:
+    assert MVP.gamma * 0.15 == pytest.approx(0.2)
 
 
 def test_the_threshold_of_a_peak_is_that_of_detection() -> None:
-    assert MppcConfig().peak_threshold == PEAK_QUALITY == 0.34
+    assert ReachConfig().peak_threshold == PEAK_QUALITY == 0.34

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from toy_views import Blob, blob_map, flat_map
 
-from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, GridConfig, GridMap
+from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, ROBUST_GRID, GridConfig, GridMap
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference, looking_down, wrap_half_pi
 from mpgrasp.grasp import GraspMap, image_to_world_angle
 
 SMALL = GridConfig(extent=0.1, cell=0.02)
+ROBUST = replace(ROBUST_GRID, extent=0.1, cell=0.02)
 WIDE = CameraIntrinsics(fx=90.0, fy=80.0, cx=40.0, cy=20.0, width=83, height=47)
 
 
@@ -76,8 +78,8 @@ def test_histograms_agree_with_counting_pixel_by_pixel(yaw: float) -> None:
     np.testing.assert_array_equal(grid.counts.sum(axis=2), grid.quality_counts)
 
 
-def test_mean_quality_of_a_cell_is_the_mean_of_bin_centres() -> None:
-    grid = GridMap(SMALL)
+def test_mean_quality_of_a_robust_cell_is_the_mean_of_bin_centres() -> None:
+    grid = GridMap(ROBUST)
     for quality in (0.12, 0.18, 0.55, 0.999, 1.0):
         grid.update(one_point(quality, 0.0, (0.5, 0.0)))
     cell = cell_at(grid, 0.5, 0.0)
@@ -96,7 +98,7 @@ def test_the_mean_angle_across_the_wrap_is_the_wrap_and_not_zero() -> None:
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
 def test_the_best_grasp_recovers_what_every_view_agrees_on(yaw: float) -> None:
-    grid, blob = GridMap(), Blob(x=0.5375, y=0.0425, angle=-1.1, width=0.035)
+    grid, blob = GridMap(ROBUST_GRID), Blob(x=0.5375, y=0.0425, angle=-1.1, width=0.035)
     rng = np.random.default_rng(1)
     for height in np.linspace(0.5, 0.3, 6):
         grid.update(blob_map(blob, looking_down([0.52, 0.02, height], yaw), rng))
@@ -109,8 +111,8 @@ def test_the_best_grasp_recovers_what_every_view_agrees_on(yaw: float) -> None:
     assert grasp.quality > 0.7
 
 
-def test_width_and_height_are_those_of_the_graspable_points_of_a_cell() -> None:
-    grid = GridMap(SMALL)
+def test_width_and_height_are_those_of_the_graspable_points_of_a_robust_cell() -> None:
+    grid = GridMap(ROBUST)
     grid.update(one_point(0.0, 0.0, (0.5, 0.0), z=0.0))
     grid.update(one_point(0.8, 0.0, (0.5, 0.0), z=0.05))
     cell = cell_at(grid, 0.5, 0.0)
@@ -142,8 +144,51 @@ def test_quality_outside_of_zero_to_one_falls_into_the_end_bins_and_nan_is_dropp
     assert grid.quality_counts.sum(axis=(0, 1)).tolist() == [1, 0, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
-def test_a_map_where_all_is_in_the_lowest_bin_has_no_best_grasp() -> None:
-    grid = GridMap()
+def test_width_and_height_of_a_cell_are_plain_means_in_eq_9() -> None:
+    grid = GridMap(SMALL)
+    grid.update(one_point(0.0, 0.0, (0.5, 0.0), z=0.0))
+    grid.update(one_point(0.8, 0.0, (0.5, 0.0), z=0.05))
+    cell = cell_at(grid, 0.5, 0.0)
+    assert grid.mean_height(cell) == pytest.approx(0.025, abs=1e-6)
+    assert grid.mean_width(cell) == pytest.approx(10 * (0.50 + 0.45) / 2 / 100, rel=1e-5)
+
+
+def test_a_cell_that_was_hardly_seen_beats_a_weak_object_in_the_published_mean_alone() -> None:
+    """The failure of multi-view picking with thin objects."""
+    weak, glimpse = (0.5, 0.0), (0.52, 0.02)
+    best = {}
+    for name, config in (("published", SMALL), ("robust", ROBUST)):
+        grid = GridMap(config)
+        for _ in range(200):
+            grid.update(one_point(0.38, 0.0, weak))
+        grid.update(one_point(0.02, 0.0, glimpse))
+        best[name] = grid.best_cell()
+    assert best == {"published": cell_at(grid, *glimpse), "robust": cell_at(grid, *weak)}
+
+
+def test_pixels_without_a_return_do_not_count_as_seen() -> None:
+    view = one_point(0.9, 0.0, (0.5, 0.0))
+    for measured, count in ((True, 1), (False, 0)):
+        seen = replace(view, measured=np.full((1, 1), measured))
+        grid = GridMap(SMALL)
+        assert (grid.update(seen) == -1).all() == (not measured)
+        assert grid.counts.sum() == count
+        forgiving = GridMap(replace(SMALL, filled_counts=True))
+        forgiving.update(seen)
+        assert forgiving.counts.sum() == 1
+
+
+def test_cells_on_the_border_of_the_published_grid_are_never_the_best() -> None:
+    corner = one_point(0.9, 0.0, (0.459, -0.041))
+    grids = GridMap(SMALL), GridMap(replace(SMALL, border_counts=True))
+    for grid in grids:
+        grid.update(corner)
+    assert grids[0].best_cell() is None
+    assert grids[1].best_cell() == (0, 0)
+
+
+def test_a_robust_map_where_all_is_in_the_lowest_bin_has_no_best_grasp() -> None:
+    grid = GridMap(ROBUST_GRID)
     assert grid.best_grasp() is None
     grid.update(flat_map(0.05, looking_down([0.5, 0.0, 0.5])))
     assert grid.observations().sum() > 0
@@ -151,7 +196,7 @@ def test_a_map_where_all_is_in_the_lowest_bin_has_no_best_grasp() -> None:
 
 
 def test_one_lucky_pixel_does_not_beat_a_cell_that_was_seen_well() -> None:
-    grid = GridMap(SMALL)
+    grid = GridMap(ROBUST)
     for _ in range(60):
         grid.update(one_point(0.75, 0.2, (0.5, 0.0)))
     grid.update(one_point(1.0, 0.2, (0.54, 0.03)))
@@ -172,7 +217,7 @@ def test_both_readings_of_table_one_have_their_cells() -> None:
 
 
 def test_a_remembered_failure_lowers_quality_around_it_only() -> None:
-    grid, blob = GridMap(), Blob(x=0.5, y=0.0)
+    grid, blob = GridMap(ROBUST_GRID), Blob(x=0.5, y=0.0)
     second = Blob(x=0.6, y=0.05, quality=lambda height: 0.6)
     T = looking_down([0.55, 0.0, 0.45])
     for _ in range(10):

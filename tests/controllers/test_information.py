@@ -68,12 +68,12 @@ def test_looking_at_a_cell_makes_it_less_uncertain_and_leaves_the_unseen_at_the_
 
 
 def test_the_prior_counts_once_per_angle_and_quality_bin() -> None:
-    grid = GridMap(GridConfig(extent=0.1, cell=0.05))
+    grid = GridMap(GridConfig(extent=0.1, cell=0.05, prior_count=2.0))
     grid.quality_counts[0, 0, 0] = 30
     p = np.full(10, 2.0 * 18)
     p[0] += 30
     p /= p.sum()
-    assert grid_entropy(grid, 2.0)[0, 0] == pytest.approx(-(p * np.log(p)).sum(), rel=1e-5)
+    assert grid_entropy(grid)[0, 0] == pytest.approx(-(p * np.log(p)).sum(), rel=1e-5)
 
 
 def test_gain_of_a_uniform_map_is_its_entropy_inside_at_any_footprint() -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from controller_parts import MppcByMean
-from toy_ticks import NOTHING, REACHING, observe, same
+from toy_ticks import NOTHING, observe, same
 from toy_views import Blob, fly
 
 from mpgrasp.controllers import make_controller
-from mpgrasp.controllers.config import MppcConfig
+from mpgrasp.controllers.config import MPPC
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.grasp import peak_height
 
@@ -17,11 +18,12 @@ from mpgrasp.grasp import peak_height
 def test_with_nothing_in_view_mvp_drifts_away_and_mppc_hardly_does() -> None:
     """The failure that the paper is about, and its cure."""
     paths = {}
-    for name in REACHING:
+    for name in ("mppc", "mvp"):
         flights = [fly(make_controller(name), NOTHING, seed=seed, noise=0.01) for seed in range(3)]
-        paths[name] = np.mean([np.hypot(*np.diff(f.camera, axis=0).T).sum() for f in flights])
+        # of the tool: the camera, 7 cm in front of it, moves on when the hand turns
+        paths[name] = np.mean([sum(np.hypot(*c.twist[:2]) * 0.1 for c in f.commands) for f in flights])
         drift = np.mean([np.hypot(*(f.camera[-1] - f.camera[0])) for f in flights])
-        assert (drift > 0.2) if name == "mvp" else (drift < 0.14)
+        assert (drift > 0.3) if name == "mvp" else (drift < 0.2)
     # what alpha = 0.2 of 0.1 m/s lets through in 6.5 s
     assert paths["mppc"] <= 0.2 * 0.1 * 6.5 + 1e-6
     assert paths["mvp"] > 3.5 * paths["mppc"]
@@ -30,15 +32,16 @@ def test_with_nothing_in_view_mvp_drifts_away_and_mppc_hardly_does() -> None:
 def test_without_a_peak_mppc_goes_sideways_at_exactly_alpha_and_mvp_does_not_care() -> None:
     dull = 0.3
     for alpha in (0.0, 0.2, 0.7):
-        config = MppcConfig(alpha=alpha)
-        mppc, mvp = (make_controller(n, config).update(observe((0.4, 0.1, 0.45), dull)) for n in REACHING)
+        config = replace(MPPC, alpha=alpha)
+        view = observe((0.4, 0.1, 0.45), dull)
+        mppc, mvp = make_controller("mppc", config).update(view), make_controller("mvp").update(view)
         assert np.hypot(*mvp.twist[:2]) > 0.05
         np.testing.assert_allclose(mppc.twist[:2], alpha * mvp.twist[:2], rtol=1e-12)
         assert mppc.twist[2] == mvp.twist[2] == -config.v_z
 
 
 def test_with_a_peak_mppc_moves_as_mvp_does() -> None:
-    mppc, mvp = (make_controller(n).update(observe((0.4, 0.1, 0.45))) for n in REACHING)
+    mppc, mvp = (make_controller(n).update(observe((0.4, 0.1, 0.45))) for n in ("mppc", "mvp"))
     np.testing.assert_array_equal(mppc.twist[:3], mvp.twist[:3])
 
 
@@ -49,7 +52,7 @@ def test_a_peak_is_three_pixels_wide_and_not_one() -> None:
     quality[20:23, 30:33] = 0.6
     assert peak_height(quality) == pytest.approx(0.6)
     for height, exists in ((0.59, True), (0.61, False)):
-        controller = make_controller("mppc", MppcConfig(peak_threshold=height))
+        controller = make_controller("mppc", replace(MPPC, peak_threshold=height))
         observation = observe((0.43, 0.0, 0.45), 0.0)
         observation.grasp_map.quality[50:53, 80:83] = 0.6
         controller.update(observation)
@@ -83,14 +86,15 @@ def test_of_equally_good_grasps_mppc_takes_the_one_seen_last() -> None:
     assert grasp is controller.pool[1]
 
 
-def test_mppc_by_mean_grasps_as_mvp_does_and_goes_sideways_as_mppc_does() -> None:
+def test_the_robust_one_grasps_as_robust_mvp_does_and_goes_sideways_at_alpha() -> None:
     flicker, steady = Blob(x=0.55, y=0.05, quality=lambda height: 1.0), Blob(x=0.48, y=-0.03)
-    hybrid, mvp, mppc = MppcByMean(), make_controller("mvp"), make_controller("mppc")
+    hybrid, mvp = make_controller("mppc_robust"), make_controller("mvp_robust")
     views: list[Blob | float] = [0.3, *(flicker if tick == 3 else steady for tick in range(12))]
     for view in views:
-        ours, full, slow = (c.update(observe((0.43, 0.0, 0.4), view)) for c in (hybrid, mvp, mppc))
+        ours, full = (c.update(observe((0.43, 0.0, 0.4), view)) for c in (hybrid, mvp))
         assert same(ours, full) == (view != 0.3)
-        np.testing.assert_array_equal(ours.twist[:3], slow.twist[:3])
+        share = 0.2 if view == 0.3 else 1.0
+        np.testing.assert_allclose(ours.twist[:2], share * full.twist[:2])
     one, other = hybrid.final_grasp(), mvp.final_grasp()
     assert one is not None
     assert other is not None

@@ -10,19 +10,16 @@ from toy_ticks import OBJECT, REACHING, THIN, blind_map, observe
 from toy_views import Blob, fly
 
 from mpgrasp.controllers import make_controller
-from mpgrasp.controllers.config import PRESETS, MppcConfig
+from mpgrasp.controllers.config import MVP
 from mpgrasp.geometry import line_angle_difference
 
 
 @pytest.mark.parametrize("name", REACHING)
-@pytest.mark.parametrize("settings", sorted(PRESETS))
 @pytest.mark.parametrize(
     "blob", [OBJECT, replace(OBJECT, x=0.42, y=-0.1, angle=-1.2)], ids=["ahead", "behind"]
 )
-def test_the_camera_ends_above_an_object_in_view_and_the_grasp_is_on_it(
-    name: str, settings: str, blob: Blob
-) -> None:
-    controller = make_controller(name, PRESETS[settings])
+def test_the_camera_ends_above_an_object_in_view_and_the_grasp_is_on_it(name: str, blob: Blob) -> None:
+    controller = make_controller(name)
     flight = fly(controller, blob, seed=2)
     assert np.hypot(*(flight.camera[-1] - [blob.x, blob.y])) < 0.01
     grasp = controller.final_grasp()
@@ -33,14 +30,15 @@ def test_the_camera_ends_above_an_object_in_view_and_the_grasp_is_on_it(
 
 
 @pytest.mark.parametrize("name", REACHING)
-def test_a_thin_object_that_shows_only_from_near_by_is_grasped_when_it_comes_into_view(name: str) -> None:
+def test_a_thin_object_that_shows_only_from_near_by_is_found_by_all_but_published_mvp(name: str) -> None:
+    """Multi-view picking has drifted away before the object shows: the paper's argument."""
     controller = make_controller(name)
     found = 0
     for seed in range(4):
         fly(controller, THIN, seed=seed)
         grasp = controller.final_grasp()
         found += grasp is not None and float(np.hypot(*(grasp.position[:2] - [THIN.x, THIN.y]))) < 0.01
-    assert found >= 3
+    assert (found >= 3) == (name != "mvp")
 
 
 @pytest.mark.parametrize("name", REACHING)
@@ -74,9 +72,9 @@ def test_beyond_the_border_the_arm_is_led_back_and_at_it_never_pushed_out(name: 
 
 @pytest.mark.parametrize("name", REACHING)
 def test_the_reach_is_done_exactly_at_z_min(name: str) -> None:
-    config = MppcConfig(z_min=0.2)
     for height, done in ((0.2 + 1e-9, False), (0.2, True), (0.19, True)):
-        assert make_controller(name, config).update(observe((0.43, 0.0, height))).done is done
+        controller = make_controller(name, replace(MVP, z_min=0.2))
+        assert controller.update(observe((0.43, 0.0, height))).done is done
 
 
 @pytest.mark.parametrize("name", REACHING)

@@ -7,7 +7,8 @@ from mpgrasp.bench.record import Method
 _NAMES = {
     "dhrnet": "DHRNet", "tfgrasp": "TF-Grasp", "ggcnn": "GG-CNN", "ggcnn2": "GG-CNN2", "fcn": "FCN",
     "fcn_residual": "FCN with residuals", "unet": "U-Net", "oracle": "oracle",
-    "mppc": "MP-PC", "mvp": "MVP", "open_loop": "open loop",
+    "mppc": "MP-PC", "mvp": "MVP", "mppc_robust": "robust MP-PC", "mvp_robust": "robust MVP",
+    "open_loop": "open loop",
 }  # fmt: skip
 
 
