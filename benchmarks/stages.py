@@ -99,7 +99,7 @@ def play(ticks: int, camera_backend: str, seed: int) -> tuple[Stopwatch, list[An
     while len(watch.ticks["render"]) < ticks:
         scene = build_scene(suite.scene_config(episode), episode_seed(suite.name, seed, episode))
         simulation = Simulation(scene)
-        camera = WristCamera(scene.model, camera_backend, crop=config.camera_crop)
+        camera = WristCamera(scene.model, camera_backend, crop=config.camera.crop)
         driver = ArmDriver(simulation)
         detector.reset(scene.height_map())
         controller.reset(episode)

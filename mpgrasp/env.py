@@ -29,6 +29,7 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.plugins import load_detector
 from mpgrasp.recording.watcher import Watcher
+from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite, episode_seed, load_suite
 
 ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
@@ -67,7 +68,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         suite: name, path or declaration of what is on the table.
         detector: registry name, `module:Class`, or a detector; grasps and `quality` are its.
         config: how an episode runs; the suite's settings by default.
-        controller: settings of z_min, the pool and `mppc_action`.
+        controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
         render_mode: None or "rgb_array", a view of the whole scene.
 
     Raises:
@@ -89,9 +90,9 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         self.metadata = dict(self.metadata)  # vector environments write into it
         self.render_mode = render_mode
         self.suite = load_suite(suite) if isinstance(suite, str) else suite
-        self.detector = load_detector(detector) if isinstance(detector, str) else detector
+        self.detector = _detector(detector, self.suite) if isinstance(detector, str) else detector
         self.config = config or self.suite.episode_config()
-        self.mppc = Mppc(controller)
+        self.mppc = Mppc(controller or _mppc_config(self.suite))
         start, z_min = self.config.start_height, self.mppc.config.z_min
         if start <= z_min:
             raise ConfigError("the reach would end where it begins", got=start, allowed=f"above {z_min} m")
@@ -174,6 +175,18 @@ def _twist(action: ArrayLike) -> NDArray[np.float64]:
     twist = np.zeros(6)
     twist[_STEERED] = np.clip(action, -1, 1) * ACTION_SCALE
     return twist
+
+
+def _detector(name: str, suite: Suite) -> GraspDetector:
+    """Return the detector of that name, with the settings that the suite has for it."""
+    return load_detector(name, settings=detector_settings((name,), suite.detector)[name])
+
+
+def _mppc_config(suite: Suite) -> ReachConfig:
+    """Return the settings of MP-PC, with those that the suite has for it."""
+    config = controller_settings(("mppc",), suite.controller)["mppc"]
+    assert isinstance(config, ReachConfig)
+    return config
 
 
 def _observed(frame: DepthFrame, view: Observation) -> Observed:

@@ -1,19 +1,24 @@
 """Detectors and controllers by registry name, or by import path `module:Class` for your own.
 
-A class given by import path is called with no arguments, or, where weights are given for it, with
-`weights=Path(...)`. It must offer the methods of `GraspDetector` or of `Controller`.
+A class given by import path is called with its settings by keyword, if any are given for it, and, where
+weights are given for it, with `weights=Path(...)`. It must offer the methods of `GraspDetector` or of
+`Controller`.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
+
+if TYPE_CHECKING:
+    from mpgrasp.controllers.config import ReachConfig
+    from mpgrasp.detectors import DetectorConfig
 
 _DETECTOR_METHODS = ("reset", "predict")
 _CONTROLLER_METHODS = ("reset", "update", "final_grasp", "diagnostics")
@@ -39,7 +44,12 @@ def check_name(kind: str, name: str, known: Iterable[str]) -> None:
         raise ConfigError(f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class"])
 
 
-def load_detector(name: str, weights: Path | None = None, runtime: str = "auto") -> GraspDetector:
+def load_detector(
+    name: str,
+    weights: Path | None = None,
+    runtime: str = "auto",
+    settings: DetectorConfig | Mapping[str, Any] | None = None,
+) -> GraspDetector:
     """Return a detector, ready to use.
 
     Args:
@@ -47,6 +57,7 @@ def load_detector(name: str, weights: Path | None = None, runtime: str = "auto")
         weights: file in place of the shipped one.
         runtime: what computes a network of the registry: auto, torch or openvino; a plug-in's is its
             own affair.
+        settings: config of a detector of the registry, keyword arguments of a plug-in; None for its own.
 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
@@ -59,7 +70,8 @@ def load_detector(name: str, weights: Path | None = None, runtime: str = "auto")
         from mpgrasp.detectors import make_detector
 
         try:
-            return make_detector(name, weights=weights, runtime=runtime)
+            assert not isinstance(settings, Mapping)
+            return make_detector(name, weights, runtime, settings)
         except MpgraspError:
             raise
         except Exception as error:  # a damaged file makes its reader fail in any way
@@ -68,13 +80,18 @@ def load_detector(name: str, weights: Path | None = None, runtime: str = "auto")
                 got="the shipped ones" if weights is None else str(weights),
                 allowed=f"a weights file of {name}",
             ) from error
-    arguments = {} if weights is None else {"weights": weights}
+    assert settings is None or isinstance(settings, Mapping)
+    arguments = {**(settings or {}), **({} if weights is None else {"weights": weights})}
     plug_in: GraspDetector = _make("detector", name, arguments, _DETECTOR_METHODS)
     return plug_in
 
 
-def load_controller(name: str) -> Controller:
+def load_controller(name: str, settings: ReachConfig | Mapping[str, Any] | None = None) -> Controller:
     """Return a controller, ready to use.
+
+    Args:
+        name: in the registry, or an import path.
+        settings: config of a controller of the registry, keyword arguments of a plug-in; None for its own.
 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
@@ -83,8 +100,10 @@ def load_controller(name: str) -> Controller:
     if ":" not in name:
         from mpgrasp.controllers import make_controller
 
-        return make_controller(name)
-    plug_in: Controller = _make("controller", name, {}, _CONTROLLER_METHODS)
+        assert not isinstance(settings, Mapping)
+        return make_controller(name, settings)
+    assert settings is None or isinstance(settings, Mapping)
+    plug_in: Controller = _make("controller", name, settings or {}, _CONTROLLER_METHODS)
     return plug_in
 
 
@@ -100,8 +119,12 @@ def _check_readable(weights: Path) -> None:
         ) from error
 
 
-def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str]) -> Any:
-    """Return an instance of the class at `module:Class`; what goes wrong in there becomes a ConfigError."""
+def plug_in_class(kind: str, path: str) -> Callable[..., Any]:
+    """Return the class at `module:Class`.
+
+    Raises:
+        ConfigError: it cannot be imported.
+    """
     module_name, _, class_name = path.partition(":")
     try:
         module = importlib.import_module(module_name)
@@ -115,12 +138,19 @@ def _make(kind: str, path: str, arguments: dict[str, Any], methods: Iterable[str
     if not callable(factory):
         names = [n for n, item in vars(module).items() if isinstance(item, type) and not n.startswith("_")]
         raise ConfigError(f"{kind} plug-in's module has no class {class_name!r}", got=path, allowed=names)
+    found: Callable[..., Any] = factory
+    return found
+
+
+def _make(kind: str, path: str, arguments: Mapping[str, Any], methods: Iterable[str]) -> Any:
+    """Return an instance of the class at `module:Class`; what goes wrong in there becomes a ConfigError."""
+    factory = plug_in_class(kind, path)
     try:
         made = factory(**arguments)
     except MpgraspError:
         raise
     except Exception as error:
-        call = f"{class_name}({', '.join(f'{key}=...' for key in arguments)})"
+        call = f"{path.partition(':')[2]}({', '.join(f'{key}=...' for key in arguments)})"
         raise ConfigError(
             f"{kind} plug-in cannot be made ({type(error).__name__}: {error})",
             got=path,

@@ -4,7 +4,8 @@ A declaration has a `title`, a `[scene]` table with fields of `SceneConfig` that
 optionally `[[turns]]` (episode k takes turn k modulo their number, on top of `[scene]`), optionally
 `trial` ("grasp", or "clear" where the table is to be cleared into a basket) and `trials` (episodes that are
 played unless a number is given), and optionally an `[episode]` table with fields of `EpisodeConfig` or
-`ClearingConfig`. Anything else is an error. benchmarks/README.md explains the format to users.
+`ClearingConfig`, and tables for the other groups of settings (`GROUPS`). Anything else is an error.
+benchmarks/README.md explains the format to users.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import tomllib
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -20,7 +21,7 @@ import numpy as np
 
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.settings import from_table, refuse_unknown
+from mpgrasp.files.settings import from_table, merged, refuse_unknown
 from mpgrasp.paths import BENCHMARKS
 
 if TYPE_CHECKING:
@@ -34,7 +35,13 @@ BOX_DENSITY = 1000.0
 """Density of a box that is declared by its size [kg/m3]."""
 
 _EPISODE_CONFIGS: Mapping[Trial, type[EpisodeConfig]] = {"grasp": EpisodeConfig, "clear": ClearingConfig}
-_CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
+EPISODE_GROUPS = ("sensor", "camera", "execution", "motion", "ik", "reflex")
+"""Groups of settings that are configs within that of an episode."""
+METHOD_GROUPS = ("controller", "detector")
+"""Groups of settings that belong to what plays."""
+GROUPS = ("scene", "episode", *EPISODE_GROUPS, *METHOD_GROUPS)
+"""Groups of settings, each a table of a suite."""
+CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
 """Settings of an episode that no suite decides, and what decides them."""
 
 
@@ -52,6 +59,10 @@ class Suite:
     """Episodes of each combination that are played unless a number is given."""
     episode: Mapping[str, Any] = field(default_factory=dict)
     """Fields of `EpisodeConfig`, or of `ClearingConfig`, in which this suite departs from the defaults."""
+    controller: Mapping[str, Any] = field(default_factory=dict)
+    """Settings for the controllers that play."""
+    detector: Mapping[str, Any] = field(default_factory=dict)
+    """Settings for the detectors that play."""
 
     def __post_init__(self) -> None:
         where = f"suite {self.name!r}"
@@ -63,15 +74,54 @@ class Suite:
             raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed="1 or more")
         if self.trial == "clear" and not all(scene.basket for scene in self.scenes):
             raise ConfigError(f"{where}: clearing needs a basket", got="basket = false", allowed="true")
-        self._check_episode(f"{where}, [episode]")
+        self._check_episode(self.episode, f"{where}, [episode]")
 
-    def _check_episode(self, where: str) -> None:
-        for key, whose in _CALLERS.items():
-            if key in self.episode:
-                raise ConfigError(f"{where}: no suite decides {key}", got=self.episode[key], allowed=whose)
-        names = (f.name for f in fields(_EPISODE_CONFIGS[self.trial]))
-        refuse_unknown(self.episode, (name for name in names if name not in _CALLERS), where)
-        self.episode_config()
+    def _check_episode(
+        self, table: Mapping[str, Any], where: str, defaults: EpisodeConfig | None = None
+    ) -> None:
+        for key, whose in CALLERS.items():
+            if key in table:
+                raise ConfigError(f"{where}: no suite decides {key}", got=table[key], allowed=whose)
+        refuse_unknown(table, self.episode_keys, where)
+        from_table(_EPISODE_CONFIGS[self.trial], table, where, defaults)
+
+    @property
+    def episode_keys(self) -> tuple[str, ...]:
+        """Names of the settings that its episodes have, without those that the caller decides."""
+        return tuple(f.name for f in fields(_EPISODE_CONFIGS[self.trial]) if f.name not in CALLERS)
+
+    def with_settings(self, tables: Mapping[str, Mapping[str, Any]], where: str) -> Suite:
+        """Return the suite with settings changed, every scene alike.
+
+        Args:
+            tables: settings by group, one of `GROUPS`; those of detectors and controllers are checked where
+                it is known who plays.
+            where: place of a group, for error messages, with `{}` for its name.
+
+        Raises:
+            ConfigError: a setting that is unknown, or a value that cannot be used.
+        """
+        from mpgrasp.scene.config import SceneConfig
+
+        scenes = self.scenes
+        if tables.get("scene"):
+            place = where.format("scene")
+            table = _with_objects(tables["scene"], place)
+            scenes = tuple(from_table(SceneConfig, table, place, scene) for scene in scenes)
+        config, episode = self.episode_config(), merged(self.episode, tables.get("episode", {}))
+        for group in (group for group in EPISODE_GROUPS if tables.get(group)):
+            before = getattr(config, group)
+            from_table(type(before), tables[group], where.format(group), before)
+            episode = merged(episode, {group: tables[group]})
+        if tables.get("episode"):
+            self._check_episode(tables["episode"], where.format("episode"), config)
+        return replace(
+            self,
+            scenes=scenes,
+            episode=episode,
+            controller=merged(self.controller, tables.get("controller", {})),
+            detector=merged(self.detector, tables.get("detector", {})),
+        )
 
     @property
     def scene(self) -> SceneConfig:
@@ -138,7 +188,7 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
         )
         for turn in found.turns
     )
-    return Suite(
+    suite = Suite(
         name=name,
         title=found.title,
         scenes=scenes,
@@ -146,6 +196,8 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
         trials=found.trials,
         episode=found.episode,
     )
+    tables = {group: getattr(found, group) for group in (*EPISODE_GROUPS, *METHOD_GROUPS)}
+    return suite.with_settings(tables, f"{where}, [{{}}]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +210,14 @@ class _Declaration:
     scene: dict[str, Any] = field(default_factory=dict)
     turns: tuple[dict[str, Any], ...] = ({},)
     episode: dict[str, Any] = field(default_factory=dict)
+    sensor: dict[str, Any] = field(default_factory=dict)
+    camera: dict[str, Any] = field(default_factory=dict)
+    execution: dict[str, Any] = field(default_factory=dict)
+    motion: dict[str, Any] = field(default_factory=dict)
+    ik: dict[str, Any] = field(default_factory=dict)
+    reflex: dict[str, Any] = field(default_factory=dict)
+    controller: dict[str, Any] = field(default_factory=dict)
+    detector: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

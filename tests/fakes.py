@@ -47,6 +47,12 @@ class OtherDetector(FakeDetector):
     pass
 
 
+class TunableDetector(FakeDetector):
+    def __init__(self, threshold: float = 0.5) -> None:
+        super().__init__()
+        self.threshold = threshold
+
+
 class NotADetector:
     pass
 

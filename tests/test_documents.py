@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from mpgrasp.camera.backends import BACKENDS
-from mpgrasp.camera.wrist_camera import D435_INTRINSICS
+from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors import make_detector
 from mpgrasp.detectors.networks.registry import NETWORKS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -13,15 +14,18 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from mpgrasp.controllers import make_controller
+from mpgrasp.controllers.config import MPPC
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
 from mpgrasp.detectors import make_detector
+from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import run_episode
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
-from mpgrasp.suite import episode_seed, load_suite
+from mpgrasp.suite import episode_seed, load_suite, parse_suite
 
 STILL = np.zeros(4)
 DOWN = np.array([0.0, 0.0, -1.0, 0.0])
@@ -62,6 +66,22 @@ def make() -> Iterator[Make]:
     yield make_env
     for env in made:
         env.close()
+
+
+def test_a_suite_s_settings_are_those_of_the_environment() -> None:
+    declared = {
+        "title": "t",
+        "sensor": {"subpixel": 0.12},
+        "controller": {"z_min": 0.2},
+        "detector": {"play": 0.002},
+    }
+    env = GraspEnv(parse_suite("mine", declared))
+    assert env.config.sensor.subpixel == 0.12
+    assert env.mppc.config == replace(MPPC, z_min=0.2)
+    assert isinstance(env.detector, OracleDetector)
+    assert env.detector.config == HandGeometry(play=0.002)
+    with pytest.raises(ConfigError, match=r"controller\.threshold: no setting of mppc"):
+        GraspEnv(parse_suite("mine", {"title": "t", "controller": {"threshold": 1}}))
 
 
 def play(env: GraspEnv, action: np.ndarray | None = None, most: int = 300) -> tuple[Any, ...]:

@@ -24,7 +24,7 @@ ORDER = (
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
     "controllers", "motion", "recording", "episode",
-    "suite", "plugins", "env", "inspection",
+    "suite", "plugins", "settings", "env", "inspection",
     "training.data", "training",
     "bench.record", "bench.processes", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
     "bench.playing", "bench.commands", "bench",
@@ -204,13 +204,22 @@ def test_importing_the_environment_loads_no_torch() -> None:
 @pytest.mark.parametrize(
     "words",
     [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "replay", "--help"),
-     ("bench", "report", "--help"), ("detectors", "--help"), ("scene", "--help"),
+     ("bench", "report", "--help"), ("bench", "settings", "--help"),
+     ("detectors", "--help"), ("scene", "--help"),
      ("training", "--help"), ("training", "generate", "--help"), ("training", "train", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
+    assert loaded(command(words)) == []
+
+
+def test_settings_are_printed_without_anything_heavy() -> None:
+    assert loaded(command(("bench", "settings", "stacked", "--detector", "dhrnet,oracle"))) == []
+
+
+def command(words: tuple[str, ...]) -> str:
+    """Code that runs a command line."""
     module = f"mpgrasp.{words[0]}"
-    code = f"import runpy, sys; sys.argv = {list(words)}; runpy.run_module({module!r}, run_name='__main__')"
-    assert loaded(code) == []
+    return f"import runpy, sys; sys.argv = {list(words)}; runpy.run_module({module!r}, run_name='__main__')"
 
 
 @pytest.mark.parametrize("package", sorted(path.parent for path in PACKAGE.rglob("__init__.pyi")))

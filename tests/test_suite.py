@@ -122,7 +122,7 @@ def test_faulty_declarations_are_refused(declared: dict[str, Any], message: str)
         ),
         ({"noise": False}, "no suite decides noise; got False; allowed: the option --no-noise"),
         ({"start_height": True}, "start_height is unusable; got True"),
-        ({"camera_crop": "all"}, "camera_crop is unusable; got 'all'"),
+        ({"camera": {"crop": "all"}}, "camera, crop is unusable; got 'all'"),
     ],
 )
 def test_episode_settings_that_cannot_be_used_are_refused_before_any_episode(

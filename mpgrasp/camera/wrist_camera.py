@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.camera import noise as sensor_noise
 from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.camera.rasteriser import Rasteriser, require_gl
 from mpgrasp.camera.ray_caster import RayCaster
@@ -24,8 +25,6 @@ from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import FloatArray, transform
 
-D435_INTRINSICS = CameraIntrinsics(fx=385.0, fy=385.0, cx=319.5, cy=239.5, width=640, height=480)
-"""Intel RealSense D435, depth stream of 640 x 480 px."""
 WRIST = "panda/wrist"
 """Name of the camera in a model."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpgrasp.exceptions import ConfigError
 
@@ -29,6 +29,21 @@ def make_controller(name: str, config: ReachConfig | None = None) -> Controller:
     """
     if name not in CONTROLLERS:
         raise ConfigError("unknown controller", got=name, allowed=CONTROLLERS)
-    module, _, attribute = CONTROLLERS[name].partition(":")
-    made: Controller = getattr(import_module(module), attribute)(config)
+    made: Controller = _class(name)(config)
     return made
+
+
+def controller_defaults(name: str) -> ReachConfig:
+    """Return the settings that a controller of the registry has unless others are given."""
+    defaults: ReachConfig = _class(name).defaults
+    return defaults
+
+
+def settings_read(name: str) -> tuple[str, ...]:
+    """Return the names of the settings that a controller of the registry reads."""
+    return tuple(getattr(_class(name), "reads", vars(controller_defaults(name))))
+
+
+def _class(name: str) -> Any:
+    module, _, attribute = CONTROLLERS[name].partition(":")
+    return getattr(import_module(module), attribute)

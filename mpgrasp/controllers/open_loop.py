@@ -16,9 +16,12 @@ class OpenLoop:
     """Is done after its first view and never moves the arm."""
 
     name = "open_loop"
+    defaults = MVP_ROBUST
+    reads = ("grid", "min_quality", "gripper_open")
+    """Settings that have an effect on it."""
 
     def __init__(self, config: ReachConfig | None = None) -> None:
-        self.config = config or MVP_ROBUST
+        self.config = config or self.defaults
         self.reset(0)
 
     def reset(self, seed: int) -> None:

@@ -10,29 +10,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.detectors.networks.registry import NETWORKS
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 
-_Maker = Callable[[Path | str | None, str], GraspDetector]
+DetectorConfig = NetworkDetectorConfig | HandGeometry
+"""Settings of a detector: those of a network's image processing, or the hand that the oracle knows."""
+_Maker = Callable[[Path | str | None, str, DetectorConfig | None], GraspDetector]
 
 
 def _network(name: str) -> _Maker:
-    def make(weights: Path | str | None, runtime: str) -> GraspDetector:
+    def make(weights: Path | str | None, runtime: str, config: DetectorConfig | None) -> GraspDetector:
         from mpgrasp.detectors.network_detector import NetworkDetector
 
-        return NetworkDetector.load(name, weights, runtime=runtime)
+        assert not isinstance(config, HandGeometry)
+        return NetworkDetector.load(name, weights, config, runtime)
 
     return make
 
 
-def _oracle(weights: Path | str | None, runtime: str) -> GraspDetector:
+def _oracle(weights: Path | str | None, runtime: str, config: DetectorConfig | None) -> GraspDetector:
     from mpgrasp.detectors.oracle import OracleDetector
 
     if weights is not None:
         raise ConfigError("the oracle has no weights", got=str(weights), allowed="no weights file")
-    return OracleDetector()
+    assert not isinstance(config, NetworkDetectorConfig)
+    return OracleDetector(config)
 
 
 DETECTORS: dict[str, _Maker] = {
@@ -42,7 +48,17 @@ DETECTORS: dict[str, _Maker] = {
 """Every network of the registry, and the oracle; torch is loaded when one is made."""
 
 
-def make_detector(name: str, weights: Path | str | None = None, runtime: str = "auto") -> GraspDetector:
+def detector_defaults(name: str) -> DetectorConfig:
+    """Return the settings that a detector of the registry has unless others are given; loads no torch."""
+    return HandGeometry() if name == "oracle" else NetworkDetectorConfig()
+
+
+def make_detector(
+    name: str,
+    weights: Path | str | None = None,
+    runtime: str = "auto",
+    config: DetectorConfig | None = None,
+) -> GraspDetector:
     """Return the detector of that name; `weights` replaces the shipped file, `runtime` computes a network.
 
     Raises:
@@ -53,4 +69,4 @@ def make_detector(name: str, weights: Path | str | None = None, runtime: str = "
         raise ConfigError("unknown detector", got=name, allowed=DETECTORS)
     if runtime not in RUNTIMES:
         raise ConfigError("unknown runtime", got=runtime, allowed=RUNTIMES)
-    return DETECTORS[name](weights, runtime)
+    return DETECTORS[name](weights, runtime, config)

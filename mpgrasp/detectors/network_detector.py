@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.depth import CROP, DepthFrame, inpaint
+from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.central_square import central_square, empty_map, says_something
+from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
 from mpgrasp.exceptions import ConfigError, WeightsError
@@ -30,24 +31,6 @@ LARGEST = 1e6
 """Outputs of a network beyond this, or not finite, are no outputs; trained ones are around 1."""
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, kw_only=True)
-class NetworkDetectorConfig:
-    """Settings of the image processing before and after the network."""
-
-    crop: int = CROP
-    """Side of the central square that the network sees [px]; smaller images are used as far as they go."""
-    quality_sigma: float = 2.0
-    """Smoothing of the quality [px]."""
-    angle_sigma: float = 1.0
-    """Smoothing of cosine and sine [px]."""
-    width_sigma: float = 1.0
-    """Smoothing of the width [px]."""
-
-    def __post_init__(self) -> None:
-        if self.crop < 1 or min(self.quality_sigma, self.angle_sigma, self.width_sigma) < 0:
-            raise ConfigError("unusable detector settings", got=self, allowed="crop from 1, sigmas from 0")
 
 
 class NetworkDetector:

@@ -31,7 +31,7 @@ class OracleDetector:
     reads_truth = True
 
     def __init__(self, hand: HandGeometry | None = None) -> None:
-        self.hand = hand or HandGeometry()
+        self.config = hand or HandGeometry()
         self._grasps: WorldGrasps | None = None
 
     def reset(self, truth: HeightMap | None) -> None:
@@ -44,7 +44,7 @@ class OracleDetector:
             raise ConfigError(
                 "the oracle was not told the true shape", allowed="reset(truth) with a height map"
             )
-        self._grasps = antipodal_grasps(truth, self.hand)
+        self._grasps = antipodal_grasps(truth, self.config)
 
     def predict(self, frame: DepthFrame) -> GraspMap:
         """Return grasps of the frame's central square; pixels without depth have none.

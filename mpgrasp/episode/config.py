@@ -5,8 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.config import CameraConfig
+from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.motion.execution_config import ExecutionConfig
+from mpgrasp.motion.ik_config import IkConfig
+from mpgrasp.motion.reflex import ReflexConfig
+from mpgrasp.motion.trajectory import MotionConfig
+
+FER_REFLEXES = ReflexConfig()
+"""Bounds of the FER: one object, because configs that hold arrays are equal only to themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,12 +32,20 @@ class EpisodeConfig:
     """A reach that takes longer is a timeout [s]."""
     camera_backend: str = "auto"
     """auto, gl or ray."""
-    camera_crop: int | None = 350
-    """Central square of the 640 x 480 image that is rendered [px]; None for the whole image."""
     noise: bool = True
-    """True for a depth camera as noisy as a D435."""
+    """True for the errors of `sensor`, False for perfect depth."""
+    sensor: DepthNoise = field(default_factory=DepthNoise)
+    """Errors of the depth camera."""
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    """Geometry of its images."""
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
     """Execution of the chosen grasp, and how it is judged."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """Speeds and accelerations of the arm."""
+    ik: IkConfig = field(default_factory=IkConfig)
+    """Differential inverse kinematics."""
+    reflex: ReflexConfig = FER_REFLEXES
+    """Bounds of the protective stops."""
 
     def __post_init__(self) -> None:
         for name in ("control_dt", "start_height", "max_reach_time"):

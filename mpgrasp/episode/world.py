@@ -7,16 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpgrasp.camera.noise import DepthNoise
-from mpgrasp.camera.wrist_camera import D435_INTRINSICS, WristCamera
+from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.seeds import start_rng
 from mpgrasp.geometry import invert, looking_down
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.ik import DifferentialIK, solve_pose
-from mpgrasp.motion.ik_config import IkConfig
-from mpgrasp.motion.reflex import ReflexConfig, ReflexMonitor
-from mpgrasp.motion.trajectory import MotionConfig
+from mpgrasp.motion.reflex import ReflexMonitor
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.scene.simulation import Simulation
@@ -40,23 +37,24 @@ class World:
     def __init__(
         self, scene_config: SceneConfig, seed: int, config: EpisodeConfig, *, colour: bool = False
     ) -> None:
+        self._config = config
         self.scene = build_scene(scene_config, seed)
         self.simulation = Simulation(self.scene)
         self.camera = WristCamera(
             self.scene.model,
             config.camera_backend,
-            DepthNoise() if config.noise else None,
-            intrinsics=D435_INTRINSICS,
-            crop=config.camera_crop,
+            config.sensor if config.noise else None,
+            intrinsics=config.camera.intrinsics,
+            crop=config.camera.crop,
             colour=colour,
         )
         jitter = np.clip(start_rng(seed).standard_normal(2), -2, 2) * config.start_jitter
         self.put_camera_above(np.array(WORKSPACE_CENTRE) + jitter, config.start_height)
         self.driver = ArmDriver(
             self.simulation,
-            MotionConfig(),
-            DifferentialIK(IkConfig()),
-            ReflexMonitor(ReflexConfig()),
+            config.motion,
+            DifferentialIK(config.ik),
+            ReflexMonitor(config.reflex),
         )
 
     def put_camera_above(self, position: ArrayLike, height: float) -> None:
@@ -84,7 +82,7 @@ class World:
         return {
             "camera": {
                 "backend": self.camera.backend,
-                "intrinsics": D435_INTRINSICS,
+                "intrinsics": self._config.camera.intrinsics,
                 "noise": self.camera.noise,
             },
             "motion": self.driver.config,

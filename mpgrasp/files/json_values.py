@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -66,20 +66,26 @@ class Difference(NamedTuple):
 
 
 def difference(a: Any, b: Any, where: str = "") -> Difference | None:
-    """Return the first place in which two JSON values differ; None if equal.
+    """Return the first place in which two JSON values differ, as `differences` has them; None if equal."""
+    return next(differences(a, b, where), None)
+
+
+def differences(a: Any, b: Any, where: str = "") -> Iterator[Difference]:
+    """Return every place in which two JSON values differ.
 
     Lists of dicts are gone through item by item if they are of one length; other lists are given as a whole.
     A key that one of them lacks is None there.
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in [*a, *(k for k in b if k not in a)]:
-            found = difference(a.get(key), b.get(key), f"{where}.{key}" if where else key)
-            if found:
-                return found
-        return None
+            yield from differences(a.get(key), b.get(key), f"{where}.{key}" if where else key)
+        return
+    if a == b:
+        return
     if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        for k, (ours, theirs) in enumerate(zip(a, b, strict=True)):
-            found = difference(ours, theirs, f"{where}.{k}") if isinstance(ours, dict) else None
-            if found:
-                return found
-    return None if a == b else Difference(where, a, b)
+        items = [(k, *both) for k, both in enumerate(zip(a, b, strict=True)) if isinstance(both[0], dict)]
+        within = [found for k, x, y in items for found in differences(x, y, f"{where}.{k}")]
+        if within:
+            yield from within
+            return
+    yield Difference(where, a, b)

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
+import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 
@@ -24,7 +25,7 @@ def from_table(kind: type[Config], table: object, where: str, defaults: Config |
 
     A table within the table changes what it names of the config within the config, and nothing else: the
     rest stays as in the default of that field. Types are strict: true is no number, 2.0 is no whole number,
-    but 2 is a number. Arrays become tuples.
+    but 2 is a number. Arrays become tuples, or numpy's where the default is one.
 
     Args:
         kind: class of the config, a dataclass.
@@ -64,6 +65,15 @@ def refuse_unknown(table: Mapping[str, Any], allowed: Iterable[str], where: str)
             raise ConfigError(f"{where}: unknown key", got=key, allowed=allowed)
 
 
+def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with the values of another one in place of its own, tables within them alike."""
+    result = dict(table)
+    for key, value in changes.items():
+        both = isinstance(value, Mapping) and isinstance(result.get(key), Mapping)
+        result[key] = merged(result[key], value) if both else value
+    return result
+
+
 def _default(field: dataclasses.Field[Any]) -> Any:
     """Return the default of a field; MISSING where there is none."""
     return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
@@ -73,6 +83,8 @@ def _value(hint: Any, value: Any, where: str, default: Any) -> Any:
     """Return the value of one field from what was declared for it."""
     if dataclasses.is_dataclass(default) and not isinstance(default, type):
         return from_table(type(default), value, where, default)
+    if isinstance(default, np.ndarray):
+        return np.array(_value(tuple[float, ...], value, where, tuple(default.tolist())))
     try:
         converted = msgspec.convert(value, hint, strict=True)
     except msgspec.ValidationError as error:

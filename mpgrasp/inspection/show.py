@@ -13,6 +13,8 @@ from mpgrasp.inspection.pictures import side_by_side
 from mpgrasp.inspection.viewpoint import Viewpoint, look
 from mpgrasp.plugins import load_detector, parse_weights
 from mpgrasp.recording.recorder import claim_file
+from mpgrasp.settings.sharing import detector_settings
+from mpgrasp.suite import load_suite
 
 
 def run(options: argparse.Namespace) -> int:
@@ -30,7 +32,10 @@ def run(options: argparse.Namespace) -> int:
         noise=not options.no_noise,
     )
     weights = parse_weights(options.weights, names)
-    detectors = {name: load_detector(name, weights.get(name), options.runtime) for name in names}
+    settings = detector_settings(names, load_suite(options.suite).detector)
+    detectors = {
+        name: load_detector(name, weights.get(name), options.runtime, settings[name]) for name in names
+    }
     for line in filter(None, map(prepare, detectors.values())):
         print(line)
     frame, predictions = look(viewpoint, detectors)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector
 from mpgrasp.motion.ik_solution import IkSolution
-from mpgrasp.robot import panda
+from mpgrasp.robot import limits
 
 UNITS = {
     "joint_position": "rad",
@@ -62,7 +62,7 @@ class Reflex:
 
 
 def _fer(name: str) -> FloatArray:
-    return np.array(getattr(panda, name), float)
+    return np.array(getattr(limits, name), float)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +77,7 @@ class ReflexConfig:
     """(7,) [rad/s]"""
     ddq_max: FloatArray = field(default_factory=lambda: _fer("DDQ_MAX"))
     """(7,) rate of the commanded velocity [rad/s2]"""
-    cartesian_velocity: float = panda.CARTESIAN_SPEED_MAX
+    cartesian_velocity: float = limits.CARTESIAN_SPEED_MAX
     """Speed of the tool point [m/s]."""
     cartesian_rotation: float = 2.5
     """Rotation of the tool [rad/s]."""

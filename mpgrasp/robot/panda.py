@@ -1,7 +1,6 @@
-"""The Franka Emika Robot (FER, "Panda") with hand and wrist camera: model, limits and poses.
+"""The Franka Emika Robot (FER, "Panda") with hand and wrist camera: model and poses.
 
-Limits are those for Panda in https://frankaemika.github.io/docs/control_parameters.html; the constants in
-current libfranka are the FR3's and differ. Frames, inertials and meshes come from franka_description.
+Its limits are those of `mpgrasp.robot.limits`. Frames, inertials and meshes come from franka_description.
 """
 
 from __future__ import annotations
@@ -11,12 +10,16 @@ from functools import cache
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from mpgrasp.exceptions import AssetError, ConfigError
-from mpgrasp.geometry import FloatArray
 from mpgrasp.paths import PANDA_ASSETS
 from mpgrasp.robot import hand
+from mpgrasp.robot.limits import CARTESIAN_SPEED_MAX as CARTESIAN_SPEED_MAX
+from mpgrasp.robot.limits import DDQ_MAX as DDQ_MAX
+from mpgrasp.robot.limits import DQ_MAX as DQ_MAX
+from mpgrasp.robot.limits import Q_HOME as Q_HOME
+from mpgrasp.robot.limits import Q_MAX as Q_MAX
+from mpgrasp.robot.limits import Q_MIN as Q_MIN
 
 PREFIX = "panda/"
 """Prefix of the robot's elements in a world to which it is attached."""
@@ -25,26 +28,6 @@ ROBOT_GROUP = 2
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 FINGER_JOINTS = ("finger_joint1", "finger_joint2")
-
-
-def _constant(*values: float) -> FloatArray:
-    array = np.array(values)
-    array.flags.writeable = False
-    return array
-
-
-Q_HOME = _constant(0, -np.pi / 4, 0, -3 * np.pi / 4, 0, np.pi / 2, np.pi / 4)
-"""(7,) [rad]: tool down, camera on the side away from the base."""
-Q_MIN = _constant(-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
-"""(7,) [rad]"""
-Q_MAX = _constant(2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)
-"""(7,) [rad]"""
-DQ_MAX = _constant(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)
-"""(7,) [rad/s]"""
-DDQ_MAX = _constant(15, 7.5, 10, 12.5, 15, 20, 20)
-"""(7,) [rad/s2]"""
-CARTESIAN_SPEED_MAX = 1.7
-"""Translation of the tool [m/s]."""
 
 
 _DESCRIPTION = Path("share/example-robot-data/robots/panda_description/meshes/collision")

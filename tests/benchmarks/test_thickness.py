@@ -150,7 +150,7 @@ def test_a_right_grasp_is_near_the_axis_off_the_ends_and_across(
 
 
 def _flat_frame(T_world_camera: FloatArray) -> DepthFrame:
-    from mpgrasp.camera.wrist_camera import D435_INTRINSICS
+    from mpgrasp.camera.config import D435_INTRINSICS
 
     depth = np.full((350, 350), 0.5, np.float32)
     return DepthFrame(depth=depth, intrinsics=D435_INTRINSICS.centre_crop(350), T_world_camera=T_world_camera)

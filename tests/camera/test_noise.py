@@ -3,8 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.camera.noise import DepthNoise, apply
-from mpgrasp.camera.wrist_camera import D435_INTRINSICS
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 

@@ -12,8 +12,9 @@ from toy_world import POSES, SMALL, World, edges_of, needs_gl, toy_world, true_f
 
 from mpgrasp.camera import rasteriser
 from mpgrasp.camera import wrist_camera as camera_module
+from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.camera.noise import DepthNoise
-from mpgrasp.camera.wrist_camera import D435_INTRINSICS, WristCamera
+from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import crop_resize
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import looking_down, transform

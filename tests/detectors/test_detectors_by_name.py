@@ -13,7 +13,7 @@ from safetensors.torch import save_file
 from toy_networks import IMAGE, random_weights, weight_files
 
 from mpgrasp.detectors import make_detector
-from mpgrasp.detectors.network_detector import NetworkDetectorConfig
+from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.networks.weights import save_weights
 from mpgrasp.exceptions import ConfigError, WeightsError
 

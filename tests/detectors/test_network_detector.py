@@ -11,8 +11,9 @@ import torch
 from toy_networks import frame, random_weights, weight_files
 
 from mpgrasp.detectors import make_detector
+from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.detector import reads_colour
-from mpgrasp.detectors.network_detector import NetworkDetector, NetworkDetectorConfig, postprocess
+from mpgrasp.detectors.network_detector import NetworkDetector, postprocess
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.weights import load_weights
 from mpgrasp.exceptions import ConfigError

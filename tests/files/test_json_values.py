@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpgrasp.files.json_values import difference, json_value, one_line
+from mpgrasp.files.json_values import difference, differences, json_value, one_line
 from mpgrasp.outcome import Outcome
 
 
@@ -77,3 +77,10 @@ def test_a_difference_is_the_first_and_names_its_place() -> None:
     found = difference(a, a | {"new": 1})
     assert found is not None
     assert found.words("then", "now") == "new: null then, 1 now"
+
+
+def test_all_differences_are_those_of_the_values_within() -> None:
+    a = {"seed": 0, "suites": [{"name": "thin", "k": 1}, {"name": "single", "k": 1}], "list": [1, 2]}
+    b = {"seed": 1, "suites": [{"name": "thin", "k": 2}, {"name": "double", "k": 1}], "list": [2, 1]}
+    assert [found.path for found in differences(a, b)] == ["seed", "suites.0.k", "suites.1.name", "list"]
+    assert list(differences(a, a)) == []

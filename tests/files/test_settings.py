@@ -7,10 +7,12 @@ import tomllib
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.settings import from_table
+from mpgrasp.files.settings import from_table, merged
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +34,11 @@ class Robot:
     retries: int | None = None
     quiet: bool = False
     hand: Hand = field(default_factory=lambda: Hand(force=10.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joints:
+    limits: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
 
 
 def robot(toml: str) -> Robot:
@@ -89,6 +96,22 @@ def test_an_error_names_the_place_what_came_and_what_is_allowed(toml: str, messa
 def test_what_is_no_table_is_refused() -> None:
     with pytest.raises(ConfigError, match="robot is not a table; got 3; allowed: name, home"):
         from_table(Robot, 3, "robot")
+
+
+def test_what_is_an_array_by_default_becomes_one() -> None:
+    made = from_table(Joints, {"limits": [1, 2.5]}, "joints")
+    assert isinstance(made.limits, np.ndarray)
+    assert made.limits.tolist() == [1.0, 2.5]
+    for limits in ([1, math.nan], "wide", [[1, 2], [3, 4]], [True, 1]):
+        with pytest.raises(ConfigError, match="joints, limits"):
+            from_table(Joints, {"limits": limits}, "joints")
+
+
+def test_tables_are_merged_key_by_key_and_leave_their_own_as_they_are() -> None:
+    table = {"a": 1, "b": {"c": 2, "d": 3}}
+    assert merged(table, {"b": {"c": 4}, "e": {"f": 5}}) == {"a": 1, "b": {"c": 4, "d": 3}, "e": {"f": 5}}
+    assert table == {"a": 1, "b": {"c": 2, "d": 3}}
+    assert merged({"a": {"b": 1}}, {"a": 2}) == {"a": 2}
 
 
 def test_a_config_made_in_python_may_hold_what_a_file_may_not() -> None:

@@ -16,11 +16,12 @@ from mpgrasp.bench.record import Cell, Cells, ClearingLine, Line
 from mpgrasp.bench.report.terminal import wide_console
 from mpgrasp.bench.results.cell_path import read_cells
 from mpgrasp.bench.results.reader import read_run
-from mpgrasp.bench.results.run_card import Card, Configuration
+from mpgrasp.bench.results.run_card import Card, Configuration, SuitePart
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.json_values import Difference, difference
+from mpgrasp.files.json_values import Difference, differences
 from mpgrasp.statistics import SIGNIFICANCE, holm, restricted, wilcoxon
+from mpgrasp.suite import METHOD_GROUPS
 
 EXIT_WORSE = 1
 _SHARED = ("seed", "camera", "noise")
@@ -95,18 +96,32 @@ class Comparison:
 def unequal_conditions(before: Configuration, after: Configuration) -> list[Difference]:
     """Differences of two configurations in what decides the worlds and the episodes that both played."""
     one, other = before.as_row(), after.as_row()
-    found = [difference(one[key], other[key], key) for key in _SHARED]
-    ours, theirs = _suites(before), _suites(after)
-    found += [difference(ours[name], theirs[name], name) for name in ours if name in theirs]
-    return [changed for changed in found if changed]
+    found = [changed for key in _SHARED for changed in differences(one[key], other[key], key)]
+    ours, theirs = ({part.suite.name: part for part in run.parts} for run in (before, after))
+    for name in (name for name in ours if name in theirs):
+        a, b = ours[name], theirs[name]
+        settings = list(differences(*_common_settings(a.settings, b.settings), name))
+        found += settings or list(differences(_declared(a, b), _declared(b, a), name))[:1]
+    return found
 
 
-def _suites(configuration: Configuration) -> dict[str, Card]:
-    """Declaration and settings by suite."""
-    return {
-        part.suite.name: {"suite": part.suite.as_row(), "episode": part.episode}
-        for part in configuration.parts
-    }
+def _common_settings(a: Card, b: Card) -> tuple[Card, Card]:
+    """Settings of two runs in the groups that both have, and there of what plays in both."""
+    groups = [group for group in a if a[group] is not None and b.get(group) is not None]
+    ours, theirs = ({group: settings[group] for group in groups} for settings in (a, b))
+    for settings in (ours, theirs):  # the switch of the noise is one of `_SHARED`
+        settings["episode"] = {k: v for k, v in settings.get("episode", {}).items() if k not in _SHARED}
+    for group in (group for group in groups if group in METHOD_GROUPS):
+        names = [name for name in a[group] if name in b[group]]
+        ours[group], theirs[group] = ({name: settings[group][name] for name in names} for settings in (a, b))
+    return ours, theirs
+
+
+def _declared(part: SuitePart, other: SuitePart) -> Card:
+    """Declaration of a suite without what it has for what plays, and what both runs keep of its episodes."""
+    suite = {key: value for key, value in part.suite.as_row().items() if key not in METHOD_GROUPS}
+    shared = [key for key in part.episode if key in other.episode and key not in _SHARED]
+    return {"suite": suite, "episode": {key: part.episode[key] for key in shared}}
 
 
 def compare(a: Cells, b: Cells) -> list[Comparison]:

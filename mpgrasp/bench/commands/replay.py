@@ -126,6 +126,9 @@ def _recorded_line(folder: Path, task: Task) -> Line:
 
 def _difference_of_configurations(then: Configuration, now: Configuration, task: Task) -> str | None:
     """Difference in what decides the one cell, in words; other cells of the run do not matter."""
+    if not any(part.settings for part in then.parts):  # a run from before run.json had them
+        bare = tuple(replace_fields(part, settings={}) for part in now.suites)
+        now = replace_fields(now, settings={}, suites=bare)
     alike = replace_fields(
         then,
         cells=now.cells,

@@ -18,10 +18,12 @@ examples:
   python -m mpgrasp.bench thin --episodes 50 --until-ci 10
   python -m mpgrasp.bench paper --workers 2
   python -m mpgrasp.bench paper --suites unseen,thin --episodes 100
+  python -m mpgrasp.bench thin --set controller.gamma=4/3 --set sensor.subpixel=0.12
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
+  python -m mpgrasp.bench settings thin              (see settings --help)
 
 Every detector and every controller meets the same scenes, sensor noise and start poses. The same
 command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
@@ -110,6 +112,7 @@ def make_parser() -> argparse.ArgumentParser:
         default=500.0,
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
+    add_settings(parser)
     add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
     add(
@@ -163,6 +166,23 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add("--quiet", action="store_true", help="no progress, only the table")
     return parser
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add the options that change settings."""
+    parser.add_argument(
+        "--set",
+        metavar="GROUP.KEY=VALUE",
+        action="append",
+        default=[],
+        help="change a setting of the suite, of the world or of what plays, such as controller.gamma=4/3 or "
+        "sensor.subpixel=0.12; may be given several times; `settings` in the place of SUITE prints them all",
+    )
+    parser.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="defaults of mvp and mppc, which --set may change: table1, published-grid or robust",
+    )
 
 
 def parse(command: Sequence[str]) -> argparse.Namespace:

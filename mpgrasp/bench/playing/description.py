@@ -24,6 +24,7 @@ from mpgrasp.bench.results.run_card import (
 )
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.files.json_values import json_value
+from mpgrasp.settings.tree import WORLD_GROUPS, tree
 from mpgrasp.suite import Suite
 
 
@@ -61,16 +62,10 @@ def configuration(plan: Plan, player: Player) -> Configuration:
 
     Files are given by name and hash: where they lie decides nothing, and is nobody's business.
     """
-    parts = tuple(
-        SuitePart(
-            suite=suite_card(suite),
-            episode=json_value(player.episode_configs[suite.name]),
-            episodes=plan.batch(suite),
-        )
-        for suite in plan.suites
-    )
+    parts = tuple(_part(plan, suite, player) for suite in plan.suites)
     alone = plan.programme is None
     return Configuration(
+        settings=parts[0].settings if alone else {},
         suite=plan.programme or parts[0].suite,
         suites=() if alone else parts,
         episode=parts[0].episode if alone else None,
@@ -86,6 +81,17 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         seed=plan.seed,
         camera=plan.camera,
         noise=plan.noise,
+    )
+
+
+def _part(plan: Plan, suite: Suite, player: Player) -> SuitePart:
+    """One suite as it is played: its episodes' own settings, and the tree of all."""
+    card, config = suite_card(suite), player.episode_configs[suite.name]
+    scenes = card.scenes[0] if len(card.scenes) == 1 else list(card.scenes)
+    groups = json_value(tree(config, plan.controller_settings, plan.detector_settings))
+    episode = {key: value for key, value in json_value(config).items() if key not in WORLD_GROUPS}
+    return SuitePart(
+        settings={"scene": scenes, **groups}, suite=card, episode=episode, episodes=plan.batch(suite)
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpgrasp.bench.record import Method, Task
 from mpgrasp.camera.backends import BACKENDS
@@ -15,6 +15,8 @@ from mpgrasp.suite import Suite
 
 if TYPE_CHECKING:
     from mpgrasp.bench.meshes.check import MeshVerdict
+    from mpgrasp.controllers.config import ReachConfig
+    from mpgrasp.detectors import DetectorConfig
 
 
 def every_method(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Method, ...]:
@@ -41,6 +43,10 @@ class Plan:
     """In the order of their turns."""
     weights: Mapping[str, Path] = field(default_factory=dict)
     """Weights files by detector; the others take what ships with mpgrasp."""
+    detector_settings: Mapping[str, DetectorConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """Config of each detector by name, or the keyword arguments of a plug-in; the others have their own."""
+    controller_settings: Mapping[str, ReachConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """The same of each controller."""
     runtime: str = "auto"
     """Engine that computes the networks: auto, torch or openvino."""
     objects: tuple[MeshVerdict, ...] = ()

@@ -35,9 +35,12 @@ class Player:
     def __init__(self, plan: Plan, run_episode: Games | None = None) -> None:
         self.plan = plan
         self.detectors = {
-            name: load_detector(name, plan.weights.get(name), plan.runtime) for name in plan.detectors
+            name: load_detector(name, plan.weights.get(name), plan.runtime, plan.detector_settings.get(name))
+            for name in plan.detectors
         }
-        self.controllers = {name: load_controller(name) for name in plan.controllers}
+        self.controllers = {
+            name: load_controller(name, plan.controller_settings.get(name)) for name in plan.controllers
+        }
         self.episode_configs = {
             suite.name: suite.episode_config(camera=plan.camera, noise=plan.noise) for suite in plan.suites
         }

@@ -23,6 +23,8 @@ from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
+from mpgrasp.settings.changes import shared_table, with_assignments
+from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     else:
         methods = programme.methods(detectors, controllers)
     suites, objects = _with_objects(suites, arguments)
+    suites = with_assignments(suites, arguments.set, noise=not arguments.no_noise)
+    detectors, controllers = (tuple(dict.fromkeys(names)) for names in zip(*methods, strict=True))
     name = suites[0].name if programme is None else arguments.suite
     out = arguments.out or Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     plan = Plan(
@@ -61,7 +65,11 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         objects=objects,
         programme=None if programme is None else name,
         methods=methods,
-        weights=parse_weights(arguments.weights, list(dict.fromkeys(m.detector for m in methods))),
+        weights=parse_weights(arguments.weights, detectors),
+        detector_settings=detector_settings(detectors, shared_table(suites, "detector")),
+        controller_settings=controller_settings(
+            controllers, shared_table(suites, "controller"), arguments.preset
+        ),
         runtime=arguments.runtime,
         episodes=arguments.episodes,
         until_ci=arguments.until_ci,

@@ -13,12 +13,13 @@ from msgspec import field
 
 from mpgrasp.bench.record import Record
 from mpgrasp.bench.results.provenance import MadeWith
+from mpgrasp.files.json_values import Difference, difference
 
 Card = dict[str, Any]
 """Settings by name, as plain values."""
 
 
-class SuiteCard(Record, frozen=True, kw_only=True):
+class SuiteCard(Record, frozen=True, kw_only=True, omit_defaults=True):
     """A suite: `mpgrasp.suite.Suite` in plain values."""
 
     name: str
@@ -29,11 +30,17 @@ class SuiteCard(Record, frozen=True, kw_only=True):
     trials: int
     episode: Card
     """Settings of the episodes that the suite changes."""
+    controller: Card = field(default_factory=dict)
+    """Settings that it has for the controllers."""
+    detector: Card = field(default_factory=dict)
+    """Settings that it has for the detectors."""
 
 
-class SuitePart(Record, frozen=True, kw_only=True):
+class SuitePart(Record, frozen=True, kw_only=True, omit_defaults=True):
     """One suite of a run and how it was played."""
 
+    settings: Card = field(default_factory=dict)
+    """Tree of settings as used: values by group; empty in runs from before there was one."""
     suite: SuiteCard
     episode: Card
     """Settings of the episodes."""
@@ -65,10 +72,13 @@ class ControllerCard(Record, frozen=True, kw_only=True):
 class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     """All that decides what the lines of a run say.
 
-    A run of one suite has its card, with `episode` and `episodes`; a run of a programme has the programme's
-    name, with `suites`.
+    A run of one suite has its card, with `settings`, `episode` and `episodes`; a run of a programme has the
+    programme's name, with `suites`.
     """
 
+    settings: Card = field(default_factory=dict)
+    """Tree of settings as used: values by group. It stands before the suite, so that a difference of two runs
+    is named after the setting."""
     suite: SuiteCard | str
     suites: tuple[SuitePart, ...] = ()
     episode: Card | None = None
@@ -91,6 +101,11 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
         if present != [not alone, alone, alone]:
             raise ValueError("either one suite with `episode` and `episodes`, or a programme with `suites`")
 
+    def difference(self, other: Configuration) -> Difference | None:
+        """Return the first difference of two configurations, who plays before how; None if equal."""
+        ours, theirs = ({"cells": row["cells"], **row} for row in (self.as_row(), other.as_row()))
+        return difference(ours, theirs)
+
     @property
     def parts(self) -> tuple[SuitePart, ...]:
         """The suites and how they were played, of a run of one suite or of a programme."""
@@ -98,7 +113,9 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
             return self.suites
         assert self.episode is not None
         assert self.episodes is not None
-        return (SuitePart(suite=self.suite, episode=self.episode, episodes=self.episodes),)
+        return (
+            SuitePart(settings=self.settings, suite=self.suite, episode=self.episode, episodes=self.episodes),
+        )
 
 
 class WorldCard(Record, frozen=True, kw_only=True):

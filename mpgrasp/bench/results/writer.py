@@ -80,7 +80,7 @@ class RunDirectory:
                 written.
         """
         new, before = cls(path), read_run(path)
-        found = difference(before.configuration.as_row(), run.configuration.as_row())
+        found = before.configuration.difference(run.configuration)
         if found:
             raise OutputError(
                 f"cannot resume with another configuration ({found.words('there', 'here')})",
@@ -223,7 +223,7 @@ class RunDirectory:
     def _refuse_other_run(self, configuration: Configuration) -> None:
         if (self.path / RUN).exists():
             try:
-                differs = difference(read_run(self.path).configuration.as_row(), configuration.as_row())
+                differs = read_run(self.path).configuration.difference(configuration)
                 found = differs and differs.words("there", "here")
             except OutputError as error:
                 found = str(error)

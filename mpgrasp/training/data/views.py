@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpgrasp.camera.wrist_camera import D435_INTRINSICS, WristCamera
+from mpgrasp.camera.config import D435_INTRINSICS
+from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import CROP, NETWORK_SIZE, CameraIntrinsics, crop_resize
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.exceptions import ConfigError

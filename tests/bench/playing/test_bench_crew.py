@@ -128,9 +128,7 @@ def test_unusable_detectors_are_refused(name: str, message: str) -> None:
 
 
 def test_unusable_controllers_are_refused() -> None:
-    with pytest.raises(
-        ConfigError, match=r"unknown controller.*mppc, mvp, mppc_robust, mvp_robust, open_loop"
-    ):
+    with pytest.raises(ConfigError, match=r"unknown controller.*mppc, mvp, .*open_loop"):
         load_controller("pid")
     with pytest.raises(ConfigError, match="lacks update, final_grasp, diagnostics"):
         load_controller(DETECTOR)

@@ -6,17 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import mujoco
-import pytest
 
 from mpgrasp.bench.playing.world_card import physics_card, world_card
 from mpgrasp.bench.results.run_card import WorldCard
+from mpgrasp.camera.config import D435_INTRINSICS, CameraConfig
 from mpgrasp.camera.noise import DepthNoise
-from mpgrasp.episode import world as built
 from mpgrasp.episode.config import EpisodeConfig
-from mpgrasp.motion import arm_driver
-from mpgrasp.motion.ik import DifferentialIK
 from mpgrasp.motion.ik_config import IkConfig
-from mpgrasp.motion.reflex import ReflexConfig, ReflexMonitor
+from mpgrasp.motion.reflex import ReflexConfig
 from mpgrasp.motion.trajectory import MotionConfig
 from mpgrasp.suite import load_suite
 
@@ -29,20 +26,13 @@ def card(**changes: Any) -> WorldCard:
     return world_card(SUITE, config, 0)
 
 
-def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_camera(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def other_driver(simulation: Any, *_: object) -> arm_driver.ArmDriver:
-        return arm_driver.ArmDriver(
-            simulation,
-            MotionConfig(max_speed=0.123),
-            DifferentialIK(IkConfig(damping=0.0123)),
-            ReflexMonitor(ReflexConfig(contact_force=12.3)),
-        )
-
-    monkeypatch.setattr(built, "ArmDriver", other_driver)
-    monkeypatch.setattr(built, "DepthNoise", lambda: DepthNoise(subpixel=0.123))
-    found = card()
+def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_camera() -> None:
+    found = card(
+        motion=MotionConfig(max_speed=0.123),
+        ik=IkConfig(damping=0.0123),
+        reflex=ReflexConfig(contact_force=12.3),
+        sensor=DepthNoise(subpixel=0.123),
+    )
     assert found.motion["max_speed"] == 0.123
     assert found.ik["damping"] == 0.0123
     assert found.reflex["contact_force"] == 12.3
@@ -50,10 +40,10 @@ def test_the_card_says_with_which_settings_the_episode_builds_its_arm_and_its_ca
 
 
 def test_the_camera_of_the_card_is_the_whole_sensor_whatever_the_crop() -> None:
-    found = card(noise=False, camera_crop=300)
+    found = card(noise=False, camera=CameraConfig(crop=300, intrinsics=replace(D435_INTRINSICS, width=600)))
     assert found.camera["backend"] == "ray"
     assert found.camera["noise"] is None
-    assert (found.camera["intrinsics"]["width"], found.camera["intrinsics"]["height"]) == (640, 480)
+    assert (found.camera["intrinsics"]["width"], found.camera["intrinsics"]["height"]) == (600, 480)
 
 
 def test_physics_are_those_of_the_compiled_model() -> None:
