@@ -37,8 +37,9 @@ def execute_grasp(
     """
     check_finite(grasp)
     told = None if on_tick is None else lambda phase: on_tick(phase, driver)
-    yaw = reachable_yaw(driver, grasp)
-    state = ExecutionState(driver, grasp, config or ExecutionConfig(), yaw=yaw, on_tick=told)
+    config = config or ExecutionConfig()
+    yaw = reachable_yaw(driver, grasp, config)
+    state = ExecutionState(driver, grasp, config, yaw=yaw, on_tick=told)
     state.play(PHASES)
     return judge(state)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.grasp import Grasp
 from mpgrasp.robot import hand
 
 
@@ -63,6 +64,13 @@ class ExecutionConfig:
     """[s]"""
     success_height: float = 0.05
     """Rise of an object over its place of rest that counts as lifted [m]."""
+
+    def planned_height(self, grasp: Grasp) -> float:
+        """Return the height of the finger tips over the table that is aimed at [m].
+
+        It is no deeper than the palm allows, nor than the table.
+        """
+        return max(-self.overtravel, float(grasp.position[2]) - self.palm_depth)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -41,8 +41,7 @@ class ExecutionState:
         """Simulated time at which it began [s]."""
         self.rest = {name: self.height_of(name) for name in self.simulation.scene.objects}
         """Height of each object at rest, by name [m]."""
-        # no deeper than the palm allows, nor than the table
-        self.planned = max(-config.overtravel, float(grasp.position[2]) - config.palm_depth)
+        self.planned = config.planned_height(grasp)
         """Height of the finger tips over the table that is aimed at [m]."""
         self.contact_height: float | None = None
         """Height of the finger tips over the table at first contact [m]."""

@@ -5,29 +5,82 @@ from __future__ import annotations
 import numpy as np
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import looking_down, wrap_half_pi
+from mpgrasp.geometry import FloatArray, looking_down, wrap_half_pi
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.arm_driver import ArmDriver
+from mpgrasp.motion.execution_config import ExecutionConfig
+from mpgrasp.motion.time_scaling import rehearse
+from mpgrasp.motion.trajectory import pose_error
+from mpgrasp.robot import hand
+
+SPARE = 0.05
+"""Room that every joint is to keep to the margin of differential IK on the way to a grasp [rad]: the elbow's
+swing home is not in the plan, and from 0.015 rad on IK brakes a wrist that turns at 1.5 rad/s."""
+STEP_LENGTH = 0.04
+"""Greatest way of the tool between two looks at the joints [m]."""
+STEP_ANGLE = 0.15
+"""Greatest turn of the tool between two looks at the joints [rad]."""
 
 
 def nearest_yaw(angle: float, yaw: float) -> float:
-    """The heading [rad] of grasp line `angle` that lies within 90 degrees of heading `yaw`.
+    """Return the heading [rad] of grasp line `angle` that lies within 90 degrees of heading `yaw`.
 
     The far one would send differential IK the long way round.
     """
     return yaw + float(wrap_half_pi(angle - yaw))
 
 
-def reachable_yaw(driver: ArmDriver, grasp: Grasp) -> float:
-    """Heading of the hand's x axis [rad]: the nearer one, unless only the other is in reach."""
+def reachable_yaw(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig | None = None) -> float:
+    """Return the heading of the hand's x axis [rad]: the nearer one, unless only the other is in reach.
+
+    A heading is in reach if IK finds a posture at the grasp, and if the whole way there, turn included, keeps
+    every joint clear of the margin at which differential IK would have to change its answer.
+    """
+    config = config or ExecutionConfig()
     T = driver.T_desired
     here = float(np.arctan2(T[1, 0], T[0, 0]))
     near = nearest_yaw(grasp.angle + np.pi / 2, here)
-    for yaw in (near, near - np.copysign(np.pi, near - here)):
-        try:
-            driver.ik.solve(driver.q, looking_down(grasp.position, yaw))
-        except ConfigError:
-            continue
-        return float(yaw)
+    headings = (near, float(near - np.copysign(np.pi, near - here)))
+    found = [yaw for yaw in headings if _has_posture(driver, grasp, yaw)]
+    for yaw in found:
+        if _keeps_clear(driver, grasp, config, yaw):
+            return yaw
     # out of reach either way: go as far as the protective stop allows and let it say why
-    return near
+    return found[0] if found else near
+
+
+def _has_posture(driver: ArmDriver, grasp: Grasp, yaw: float) -> bool:
+    """True if IK finds joint positions at the grasp."""
+    try:
+        driver.ik.solve(driver.q, looking_down(grasp.position, yaw))
+    except ConfigError:
+        return False
+    return True
+
+
+def _keeps_clear(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, yaw: float) -> bool:
+    """True if the way over the grasp, down and up again brings no joint closer to its margin than `SPARE`.
+
+    A joint that is closer already must not come closer still.
+    """
+    ik, q, T = driver.ik, np.array(driver.q, float), driver.T_desired
+    needed = np.minimum(SPARE, ik.room(q))
+    for target in _way(T, grasp, config, yaw):
+        error = pose_error(T, target)
+        steps = max(np.linalg.norm(error[:3]) / STEP_LENGTH, np.linalg.norm(error[3:]) / STEP_ANGLE)
+        shares = np.linspace(0.0, 1.0, int(np.ceil(steps)) + 1)[1:]
+        path = rehearse(ik, q, T, error, shares)
+        if np.any(ik.room(path) < needed - 1e-9):
+            return False
+        q, T = (path[-1] if len(path) else q), target
+    return True
+
+
+def _way(T: FloatArray, grasp: Grasp, config: ExecutionConfig, yaw: float) -> list[FloatArray]:
+    """Poses (4, 4) between which the phases of an execution move in straight lines."""
+    x, y, z = (float(value) for value in grasp.position)
+    above, down = z + config.approach, config.planned_height(grasp) + hand.FINGERTIP_BEYOND_TCP
+    risen = T.copy()
+    risen[2, 3] = max(float(T[2, 3]), above)
+    heights = (above, down, down + config.lift)
+    return [risen, *(looking_down([x, y, height], yaw) for height in heights)]

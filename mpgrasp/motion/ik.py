@@ -26,6 +26,9 @@ from mpgrasp.robot import panda
 
 TCP_SITE = "tcp"
 
+_Blocked = tuple[str, int | None, float, float]
+"""A limit that holds the motion back: its name, joint, value and bound."""
+
 
 @cache
 def _arm_model() -> mujoco.MjModel:
@@ -111,9 +114,10 @@ class DifferentialIK:
             dq = np.zeros(7)
         left = error - J @ dq * dt
         residual, residual_angle = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
-        blocked: tuple[str | None, int | None, float, float] = (None, None, 0.0, 0.0)
-        if residual > 1e-4 or residual_angle > 1e-3:
-            blocked = self._blocked(q, dq, demanded, dt)
+        blocked = self._joint_limit(q, dq, demanded, dt)
+        if blocked is None and (residual > 1e-4 or residual_angle > 1e-3):
+            blocked = self._collision()
+        limit, joint, value, bound = blocked or (None, None, 0.0, 0.0)
         return IkSolution(
             dq=dq,
             demanded_dq=demanded,
@@ -122,10 +126,10 @@ class DifferentialIK:
             feasible=feasible,
             residual=residual,
             residual_angle=residual_angle,
-            blocked=blocked[0],
-            blocked_joint=blocked[1],
-            blocked_value=blocked[2],
-            blocked_bound=blocked[3],
+            blocked=limit,
+            blocked_joint=joint,
+            blocked_value=value,
+            blocked_bound=bound,
         )
 
     def solve(
@@ -181,12 +185,17 @@ class DifferentialIK:
             )  # fmt: skip
         return [self._collision_limits[dt]]
 
-    def _blocked(
-        self, q: FloatArray, dq: FloatArray, demanded: FloatArray, dt: float
-    ) -> tuple[str | None, int | None, float, float]:
-        """The limit that the answer leans on: its name, joint, value and bound."""
+    def room(self, q: FloatArray) -> FloatArray:
+        """Return how far joints (..., 7) are from the nearer end of the range that the program uses [rad].
+
+        Below 0 they are within `joint_margin` of a limit.
+        """
+        return np.asarray(np.minimum(q - self._q_min, self._q_max - q))
+
+    def _joint_limit(self, q: FloatArray, dq: FloatArray, demanded: FloatArray, dt: float) -> _Blocked | None:
+        """The joint limit that the answer leans on."""
         after = q + dq * dt
-        slack = np.minimum(after - self._q_min, self._q_max - after)
+        slack = self.room(after)
         # the program closes 95 % of the gap to a joint limit per tick
         j = int(np.argmin(slack))
         if slack[j] < 2e-3:
@@ -197,10 +206,14 @@ class DifferentialIK:
         j = int(np.argmax(np.abs(dq) / self._dq_max))
         if abs(dq[j]) > 0.999 * self._dq_max[j]:
             return "joint_velocity", j + 1, float(demanded[j]), float(np.copysign(self._dq_max[j], dq[j]))
+        return None
+
+    def _collision(self) -> _Blocked | None:
+        """The collision limit, where the last pose is close to it."""
         distance = self.clearance()
         if distance < 2 * self.config.collision_distance:
             return "collision_avoidance", None, distance, self.config.collision_distance
-        return None, None, 0.0, 0.0
+        return None
 
     def clearance(self) -> float:
         """Least distance [m] within the pairs that must not collide, at the last pose; inf beyond

@@ -26,7 +26,8 @@ class IkSolution:
     residual_angle: float = 0.0
     """Angle that is left to the desired orientation after this tick [rad]."""
     blocked: str | None = None
-    """The limit that holds the motion back: joint_position, joint_velocity or collision_avoidance."""
+    """Limit that the answer leans on: joint_position or joint_velocity, whether or not the other joints make
+    up for it; or collision_avoidance, where the motion is held back."""
     blocked_joint: int | None = None
     """1..7 where `blocked` is a joint's limit."""
     blocked_value: float = 0.0

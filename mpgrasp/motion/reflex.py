@@ -162,7 +162,7 @@ class ReflexMonitor:
             # the arm rests before its first command
             ddq = (self._dq_commanded - (0.0 if previous is None else previous)) / dt
             self.reflex = (
-                self._joints(arm, ddq)
+                self._joints(arm, solution, ddq)
                 or self._demands(arm.time, solution)
                 or self._cartesian(arm, T_world_tcp_desired)
             )
@@ -170,15 +170,20 @@ class ReflexMonitor:
                 self.reflex = _reflex("contact_force", arm.time, arm.contact_force, self.config.contact_force)
         return self.reflex
 
-    def _joints(self, arm: MeasuredArm, ddq: FloatArray) -> Reflex | None:
+    def _joints(self, arm: MeasuredArm, solution: IkSolution, ddq: FloatArray) -> Reflex | None:
         c, q = self.config, arm.q
         for j in range(7):
             if not c.q_min[j] <= q[j] <= c.q_max[j]:
                 bound = c.q_min[j] if q[j] < c.q_min[j] else c.q_max[j]
                 return _reflex("joint_position", arm.time, q[j], bound, joint=j + 1)
-        return _worst("joint_velocity", arm.time, arm.dq, c.dq_max) or _worst(
-            "joint_acceleration", arm.time, ddq, c.ddq_max
-        )
+        over = _worst("joint_velocity", arm.time, arm.dq, c.dq_max)
+        if over is not None:
+            return over
+        over = _worst("joint_acceleration", arm.time, ddq, c.ddq_max)
+        if over is not None and solution.blocked_joint is not None:
+            # a joint came to its limit, and the others jump to make up for it: they are not the cause
+            return _blocked(arm.time, solution)
+        return over
 
     def _demands(self, time: float, solution: IkSolution) -> Reflex | None:
         c = self.config
@@ -192,10 +197,7 @@ class ReflexMonitor:
             return None
         # IK fell behind: name what held it back
         if solution.blocked is not None:
-            return _reflex(
-                solution.blocked, time, solution.blocked_value, solution.blocked_bound,
-                joint=solution.blocked_joint, demanded=solution.blocked == "joint_velocity",
-            )  # fmt: skip
+            return _blocked(time, solution)
         if behind:
             return _reflex("tracking_position", time, solution.residual, c.ik_residual, demanded=True)
         return _reflex(
@@ -231,6 +233,15 @@ def _reflex(
     return Reflex(
         limit=limit, joint=joint, value=float(np.asarray(value)), bound=float(np.asarray(bound)),
         time=float(time), demanded=demanded,
+    )  # fmt: skip
+
+
+def _blocked(time: float, solution: IkSolution) -> Reflex:
+    """The stop by the limit that the answer of IK leans on."""
+    assert solution.blocked is not None
+    return _reflex(
+        solution.blocked, time, solution.blocked_value, solution.blocked_bound,
+        joint=solution.blocked_joint, demanded=solution.blocked == "joint_velocity",
     )  # fmt: skip
 
 

@@ -80,6 +80,25 @@ def test_a_stop_names_limit_joint_value_and_bound(
     assert "bound" in str(reflex)
 
 
+@pytest.mark.parametrize(("limit", "bound"), [("joint_position", 2.8873), ("joint_velocity", 2.61)])
+def test_joints_that_jump_because_another_is_at_its_limit_are_not_named_for_it(
+    limit: str, bound: float
+) -> None:
+    leaning = solution(
+        dq=one(3, 0.4), blocked=limit, blocked_joint=7, blocked_value=bound, blocked_bound=bound
+    )
+    reflex = check(ReflexMonitor(), solution=leaning)
+    assert reflex is not None
+    assert (reflex.limit, reflex.joint, reflex.bound) == (limit, 7, bound)
+
+
+def test_a_joint_at_its_limit_that_makes_no_other_jump_stops_nothing() -> None:
+    leaning = solution(
+        dq=one(3, 0.05), blocked="joint_position", blocked_joint=7, blocked_value=2.887, blocked_bound=2.8873
+    )
+    assert check(ReflexMonitor(), solution=leaning) is None
+
+
 def test_a_stop_reads_well() -> None:
     reflex = Reflex(limit="joint_velocity", joint=4, value=2.31, bound=2.175, time=3.4)
     assert str(reflex) == "joint_velocity: joint 4 at 2.31 rad/s, bound 2.175 rad/s, t = 3.40 s"
