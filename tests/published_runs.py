@@ -160,6 +160,38 @@ def share_of_inference(run: str, detector: str, controller: str) -> float:
     return 100 * float(sum(t["detect"] for t in times) / sum(sum(t.values()) for t in times))
 
 
+def alone(run: str, method: Method, other: Method) -> int:
+    """Return the number of episodes in which one method succeeded and the other did not."""
+    ours, theirs = cell(run, *method), cell(run, *other)
+    assert ours.keys() == theirs.keys()
+    return sum(line["success"] and not theirs[k]["success"] for k, line in ours.items())
+
+
+def p_of_success(run: str, method: Method, other: Method) -> float:
+    """Return p of McNemar's exact test."""
+    ours, theirs = alone(run, method, other), alone(run, other, method)
+    return float(binomtest(ours, ours + theirs, 0.5).pvalue)
+
+
+def stopped(run: str, detector: str, controller: str) -> int:
+    """Return the number of episodes that ended in a protective stop."""
+    return sum(line["reflex"] is not None for line in cell(run, detector, controller).values())
+
+
+def singular(run: str, detector: str, controller: str) -> int:
+    """Return the number of episodes whose smallest singular value fell below 0.05."""
+    return sum(line["min_singular_value"] < 0.05 for line in cell(run, detector, controller).values())
+
+
+def least_singular_value(run: str, detector: str, controller: str) -> float:
+    return float(min(line["min_singular_value"] for line in cell(run, detector, controller).values()))
+
+
+def blind_drift(run: str, detector: str, controller: str) -> float:
+    """Return the mean drift to the side before the first detection [mm]."""
+    return 1e3 * mean(line["blind_drift_m"] for line in cell(run, detector, controller).values())
+
+
 # clearing tables
 
 
