@@ -189,7 +189,7 @@ def least_singular_value(run: str, detector: str, controller: str) -> float:
 
 def blind_drift(run: str, detector: str, controller: str) -> float:
     """Return the mean drift to the side before the first detection [mm]."""
-    return 1e3 * mean(line["blind_drift_m"] for line in cell(run, detector, controller).values())
+    return float(1e3 * mean(line["blind_drift_m"] for line in cell(run, detector, controller).values()))
 
 
 # clearing tables
