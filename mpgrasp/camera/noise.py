@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.linear_algebra import norm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +115,7 @@ def _correlated_noise(
         return white
     kernel = cv2.getGaussianKernel(2 * radius + 1, blur_px, cv2.CV_32F)
     # white noise through a separable filter has the product of both kernels' squared norms for its variance
-    kernel = np.asarray(kernel / np.linalg.norm(kernel), np.float32)
+    kernel = np.asarray(kernel / norm(kernel[:, 0]), np.float32)
     # wrapping round keeps the variance even at the border, where reflecting would double it
     padded = cv2.copyMakeBorder(white, radius, radius, radius, radius, cv2.BORDER_WRAP)
     blurred = np.asarray(cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel), np.float32)

@@ -28,7 +28,7 @@ from mpgrasp.geometry import FloatArray, transform
 WRIST = "panda/wrist"
 """Name of the camera in a model."""
 
-_MUJOCO_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+_MUJOCO_TO_OPENCV = np.array([1.0, -1.0, -1.0])
 _DEFAULT_NOISE = DepthNoise()
 _log = logging.getLogger(__name__)
 
@@ -88,7 +88,7 @@ class WristCamera:
             raise CameraError(
                 "the model has no such camera", got=WRIST, allowed=names or "none in this model"
             )
-        return transform(data.cam_xmat[index].reshape(3, 3) @ _MUJOCO_TO_OPENCV, data.cam_xpos[index])
+        return transform(data.cam_xmat[index].reshape(3, 3) * _MUJOCO_TO_OPENCV, data.cam_xpos[index])
 
     def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
         """Depth that the sensor reports from the model's camera, noise included unless it is None."""

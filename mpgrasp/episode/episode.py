@@ -22,6 +22,7 @@ from mpgrasp.episode.stages import StageClock
 from mpgrasp.episode.world import World
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution import execute_grasp
 from mpgrasp.motion.motion_statistics import MotionStatistics
@@ -221,7 +222,7 @@ class Episode:
         position = self._grasp.position[:2]
         return min(
             self.scene.objects,
-            key=lambda name: float(np.linalg.norm(self.simulation.object_pose(name)[:2, 3] - position)),
+            key=lambda name: norm(self.simulation.object_pose(name)[:2, 3] - position),
         )
 
     def _verdict(self, outcome: Outcome) -> str:

@@ -11,6 +11,7 @@ from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.seeds import start_rng
 from mpgrasp.geometry import invert, looking_down
+from mpgrasp.linear_algebra import product
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.ik import DifferentialIK, solve_pose
 from mpgrasp.motion.reflex import ReflexMonitor
@@ -68,9 +69,9 @@ class World:
             ConfigError: a place out of the arm's reach.
         """
         simulation = self.simulation
-        T_tcp_camera = invert(simulation.T_world_tcp) @ self.camera.pose(simulation.data)
+        T_tcp_camera = product(invert(simulation.T_world_tcp), self.camera.pose(simulation.data))
         T = looking_down([*np.asarray(position, float), height])
-        T[:2, 3] -= (T[:3, :3] @ T_tcp_camera[:3, 3])[:2]
+        T[:2, 3] -= product(T[:3, :3], T_tcp_camera[:3, 3])[:2]
         simulation.set_q(solve_pose(simulation.q, T))
 
     def configs(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from mpgrasp.linear_algebra import dot
 from mpgrasp.robot import panda
 
 _NO_OBJECT = -1
@@ -44,7 +45,7 @@ class PadContacts:
         closing = self._data.site_xmat[self._tcp].reshape(3, 3)[:, 1]
         for side, pad in enumerate(self._pads):
             for i in np.flatnonzero((geom == pad).any(axis=1) & (owner >= 0)).tolist():
-                if abs(contact.frame[i, :3] @ closing) > PAD_FACE_COSINE and self._normal_force(i) > 0:
+                if abs(dot(contact.frame[i, :3], closing)) > PAD_FACE_COSINE and self._normal_force(i) > 0:
                     touched[side].add(self._objects[owner[i]])
         return touched
 

@@ -11,6 +11,7 @@ import numpy as np
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.height_map import HeightMap
+from mpgrasp.linear_algebra import product
 from mpgrasp.paths import SCENES
 from mpgrasp.robot.panda import PREFIX, panda_spec, set_home
 from mpgrasp.scene.cloth import RGBA as CLOTH_RGBA
@@ -92,8 +93,8 @@ class Scene:
         shadow = np.zeros((len(y), len(x)), bool)
         for geom in np.flatnonzero(self.model.geom_group == OBJECT_GROUP):
             R = data.geom_xmat[geom].reshape(3, 3)
-            centre = data.geom_xpos[geom] + R @ self.model.geom_aabb[geom, :3]
-            reach = np.abs(R) @ self.model.geom_aabb[geom, 3:]
+            centre = data.geom_xpos[geom] + product(R, self.model.geom_aabb[geom, :3])
+            reach = product(np.abs(R), self.model.geom_aabb[geom, 3:])
             shadow[np.ix_(np.abs(y - centre[1]) <= reach[1], np.abs(x - centre[0]) <= reach[0])] = True
         return shadow
 
