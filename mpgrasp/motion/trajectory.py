@@ -116,7 +116,9 @@ def path_profile(
     duration = 1.0 / v + v / a
     t = np.arange(config.dt, duration + config.dt, config.dt)
     ramp = np.clip(np.minimum(a * t, a * (duration - t)), 0.0, v)
-    velocity = np.convolve(ramp, np.full(config.smoothing, 1.0 / config.smoothing))
+    velocity = np.zeros(len(ramp) + config.smoothing - 1)
+    for delay in range(config.smoothing):  # np.convolve would ask BLAS
+        velocity[delay : delay + len(ramp)] += ramp / config.smoothing
     share = np.cumsum(velocity)
     if share[-1] <= 0:
         return np.ones(1)  # a move so short that it fits into one tick
