@@ -57,7 +57,7 @@ def svd(matrix: Array) -> Svd:
     if max(matrix.shape) > _LARGEST_SVD:
         raise ValueError(f"svd takes up to {_LARGEST_SVD} rows and columns, got {matrix.shape}")
     sigma, U, Vt = cv2.SVDecomp(np.ascontiguousarray(matrix, np.float64))
-    return Svd(np.asarray(U), np.asarray(sigma)[:, 0], np.asarray(Vt))
+    return Svd(np.asarray(U, float), np.asarray(sigma, float)[:, 0], np.asarray(Vt, float))
 
 
 def least_squares(matrix: Array, right: Array, cut: float) -> Array:
