@@ -45,6 +45,13 @@ def rotation_z(angle: float) -> FloatArray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_about(axis: ArrayLike, angle: float) -> FloatArray:
+    """Rotation (3, 3) by an angle [rad] about an axis (3,) of any length."""
+    x, y, z = np.asarray(axis, float) / norm(axis)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * product(K, K))
+
+
 def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     """Rotation (3, 3) of a quaternion (4,), wxyz, of unit length."""
     w, x, y, z = (float(number) for number in np.asarray(quaternion, float))
