@@ -100,7 +100,7 @@ class WristCamera:
         return transform(data.cam_xmat[index].reshape(3, 3) * _MUJOCO_TO_OPENCV, data.cam_xpos[index])
 
     def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
-        """Depth that the sensor reports from the model's camera, and the pose in which that is believed to be."""
+        """Depth that the sensor reports from the model's camera, and the pose in which it is believed."""
         T, errors = self.pose(data), self.errors
         depth = self._depth(data, T)
         pattern = None if errors.pattern is None else errors.pattern.at(float(data.time))

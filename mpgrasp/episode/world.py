@@ -123,4 +123,4 @@ def _start_offset(config: EpisodeConfig, rng: np.random.Generator) -> FloatArray
     if config.start_radius is None:
         return np.asarray(np.clip(rng.standard_normal(2), -2, 2) * config.start_jitter)
     radius, angle = config.start_radius * np.sqrt(rng.uniform()), rng.uniform(-np.pi, np.pi)
-    return radius * np.array([np.cos(angle), np.sin(angle)])
+    return np.asarray(radius * np.array([np.cos(angle), np.sin(angle)]))

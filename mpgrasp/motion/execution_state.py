@@ -87,7 +87,7 @@ class ExecutionState:
             self._on_tick(self.phase)
 
     def felt(self) -> float:
-        """External force over the last tick as the robot feels it [N]; its noise is drawn anew at each call."""
+        """External force over the last tick as the robot feels it [N]; noise is drawn anew at each call."""
         force, noise = self.driver.touch, self.config.force_noise
         if noise == 0:
             return force

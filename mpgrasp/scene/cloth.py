@@ -103,7 +103,7 @@ def make_wrinkles(height: float, width: float, count: int, rng: np.random.Genera
         fade = np.clip(2 - 4 * np.abs(along) / length, 0, 1)
         ridge = height * np.exp2(-((2 * across / width) ** 2)) * fade * fade * (3 - 2 * fade)
         np.maximum(surface, ridge, out=surface)
-    return surface
+    return np.asarray(surface)
 
 
 def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
