@@ -55,7 +55,7 @@ def run_clearing(
         seed: of the scene, the start pose and the sensor noise; 0 is a seed.
         detector: is reset before every attempt, with the truth of that moment where it reads it.
         controller: is reset before every attempt. One that has `remember_failure(position)` is then
-            told where grasps have failed since the last success, oldest first.
+            told where grasps have failed, and where reaches were stopped, since the last success, oldest first.
         config: how the episode runs.
         recorder: is shown everything.
 
@@ -235,11 +235,19 @@ class Clearing:
             self._blind += 1
         else:
             self._blind = 0
-        if result.grasp is not None and result.outcome in FAILED_GRASPS:
-            self._failed_at.append(result.grasp.position)
+        if result.outcome in FAILED_GRASPS:
+            self._failed_at.append(self._aim() if result.grasp is None else result.grasp.position)
         elif result.outcome in (Outcome.SUCCESS, Outcome.DROPPED, Outcome.NO_GRASP):
             # the scene is another one, or nothing else is there to be tried
             self._failed_at.clear()
+
+    def _aim(self) -> FloatArray:
+        """Point (3,) that a stopped reach was about: its grasp so far, or what the camera looked down on [m]."""
+        grasp, frame = self.controller.final_grasp(), self.episode.frame
+        if grasp is not None:
+            return grasp.position
+        assert frame is not None, "a reach looks before it moves"
+        return np.append(frame.T_world_camera[:2, 3], 0.0)
 
     def _tally(self) -> None:
         """Keep what the driver has measured since its last reset."""
