@@ -21,5 +21,7 @@ class Outcome(StrEnum):
     """Something was between the fingers and was lost."""
     DROPPED = "dropped"
     """Something was lifted and did not get into the basket; where there is one."""
+    KNOCKED_OFF = "knocked_off"
+    """Nothing is left on the table, and something of it lies beside the basket; where tables are cleared."""
     TIMEOUT = "timeout"
     """The reach did not end in time."""

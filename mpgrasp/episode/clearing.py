@@ -48,7 +48,7 @@ def run_clearing(
     config: ClearingConfig | None = None,
     recorder: Recorder | None = None,
 ) -> ClearingResult:
-    """Play one episode until the table is clear, the time is up or nothing more is found.
+    """Play one episode until nothing is left on the table, the time is up or nothing more is found.
 
     Args:
         scene_config: what is on the table; with a basket.
@@ -132,8 +132,9 @@ class Clearing:
     def _ending(self) -> Outcome | None:
         if self.time > self.config.time_limit:
             return Outcome.TIMEOUT
-        if not self._whereabouts()[2]:
-            return Outcome.SUCCESS
+        _, knocked_off, left = self._whereabouts()
+        if not left:
+            return Outcome.KNOCKED_OFF if knocked_off else Outcome.SUCCESS
         return Outcome.NO_GRASP if self._blind >= self.config.blind_attempts else None
 
     def _whereabouts(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
