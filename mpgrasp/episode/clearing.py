@@ -55,7 +55,7 @@ def run_clearing(
         seed: of the scene, the start pose and the sensor noise; 0 is a seed.
         detector: is reset before every attempt, with the truth of that moment where it reads it.
         controller: is reset before every attempt. One that has `remember_failure(position)` is then
-            told where grasps have failed, and where reaches were stopped, since the last success, oldest first.
+            told where grasps have failed, or reaches were stopped, since the last success, oldest first.
         config: how the episode runs.
         recorder: is shown everything.
 
@@ -243,7 +243,7 @@ class Clearing:
             self._failed_at.clear()
 
     def _aim(self) -> FloatArray:
-        """Point (3,) that a stopped reach was about: its grasp so far, or what the camera looked down on [m]."""
+        """Point (3,) that a stopped reach was about [m]: its grasp so far, or what the camera looked down on."""
         grasp, frame = self.controller.final_grasp(), self.episode.frame
         if grasp is not None:
             return grasp.position

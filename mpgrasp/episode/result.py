@@ -99,8 +99,8 @@ class ClearingResult:
     """Result of one episode in which a table was to be cleared."""
 
     outcome: Outcome
-    """success: all objects are in the basket; knocked_off: none is left in the workspace, but some lie elsewhere;
-    timeout; or no_grasp: nothing more was found to grasp."""
+    """success: all objects are in the basket; knocked_off: none is left in the workspace, but some lie
+    elsewhere; timeout; or no_grasp: nothing more was found to grasp."""
     picks: tuple[Pick, ...]
     """All attempts, in their order."""
     in_basket: tuple[str, ...]

@@ -42,15 +42,15 @@ class FingerContacts:
         self._object_of = _owners(model, bodies)[model.geom_bodyid]
         self._finger_of = _owners(model, fingers)[model.geom_bodyid]
         weight = model.body_subtreemass[bodies] * np.linalg.norm(model.opt.gravity)
-        # A body of weight W that lies on both diagonals, 30 degrees from upright, is pressed by cos 30 W from
-        # either side: less than its weight. A hand that clamps presses harder than any weight that it can carry.
+        # A body of weight W that lies on both diagonals, 30 degrees from upright, is pressed with W cos 30 from
+        # either side, less than W. The cap lies above the weight of all that the arm can carry, 3 kg.
         self._needed = np.clip(weight, LEAST_FORCE, hand.GRIPPER_FORCE_MIN)
 
     def forces(self) -> dict[str, FloatArray]:
         """Forces (2,) with which the left and the right finger press an object, by name [N].
 
-        Each is the sum of the normal forces' components along the closing direction, inwards positive, over all
-        contacts whose normal lies within 60 degrees of it. Objects without such a contact are left out.
+        Each is the sum of the normal forces' components along the closing direction, inwards positive, over
+        all contacts whose normal lies within 60 degrees of it. Objects without such a contact are left out.
         """
         found: dict[str, FloatArray] = {}
         contact = self._data.contact

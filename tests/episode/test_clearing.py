@@ -205,7 +205,7 @@ class Rushing(Fumbling):
 
 
 def test_the_grasp_of_a_stopped_reach_is_remembered_and_another_is_tried() -> None:
-    one, other = grasp_at(BARE), grasp_at(BARE + [0.1, 0.05, 0.0])
+    one, other = grasp_at(BARE), grasp_at(BARE + np.array([0.1, 0.05, 0.0]))
     controller = Rushing(one, other)
     result = fumble(controller, time_limit=9.0, recovery_time=1.0)
     assert len(result.picks) >= 3
