@@ -243,7 +243,7 @@ class Clearing:
             self._failed_at.clear()
 
     def _aim(self) -> FloatArray:
-        """Point (3,) that a stopped reach was about [m]: its grasp so far, or what the camera looked down on."""
+        """Point (3,) that a stopped reach was about [m]: its grasp so far, or the place under the camera."""
         grasp, frame = self.controller.final_grasp(), self.episode.frame
         if grasp is not None:
             return grasp.position

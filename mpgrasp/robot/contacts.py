@@ -42,8 +42,8 @@ class FingerContacts:
         self._object_of = _owners(model, bodies)[model.geom_bodyid]
         self._finger_of = _owners(model, fingers)[model.geom_bodyid]
         weight = model.body_subtreemass[bodies] * np.linalg.norm(model.opt.gravity)
-        # A body of weight W that lies on both diagonals, 30 degrees from upright, is pressed with W cos 30 from
-        # either side, less than W. The cap lies above the weight of all that the arm can carry, 3 kg.
+        # A body of weight W that lies on both diagonals, 30 degrees from upright, is pressed with W cos 30
+        # from either side, less than W. The cap lies above the weight of all that the arm can carry, 3 kg.
         self._needed = np.clip(weight, LEAST_FORCE, hand.GRIPPER_FORCE_MIN)
 
     def forces(self) -> dict[str, FloatArray]:

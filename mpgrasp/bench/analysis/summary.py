@@ -30,8 +30,8 @@ from mpgrasp.statistics import holm, mean_interval, median_interval, restricted,
 SINGULARITY = 0.05
 """Smallest singular value of the tool Jacobian (m, rad) below which a stop counts as one of a singularity.
 
-At 0.1 m/s the worst direction then asks a joint for 0.1 / 0.05 = 2 rad/s of the 2.175 that it may have. In the
-runs that were published when this was chosen, 5 of 6,497 attempts without a stop came below it (59 below
+At 0.1 m/s the worst direction then asks a joint for 0.1 / 0.05 = 2 rad/s of the 2.175 that it may have. In
+the runs that were published when this was chosen, 5 of 6,497 attempts without a stop came below it (59 below
 0.07), and 42 of 143 with one, all stopped by the velocity or acceleration of joint 3, 4 or 5.
 """
 

@@ -93,8 +93,8 @@ def motion_table(evaluation: Evaluation) -> Table:
             *(h for _, h in _MOTION),
         ),
         rows=rows,
-        note="Smallest singular value of the tool's Jacobian (m, rad); - where it was not measured. Singular: "
-        f"stops that ended an attempt in which it had fallen below {SINGULARITY:g}.",
+        note="Smallest singular value of the tool's Jacobian (m, rad); - where it was not measured. "
+        f"Singular: stops that ended an attempt in which it had fallen below {SINGULARITY:g}.",
     )
 
 
