@@ -154,6 +154,24 @@ def test_what_hangs_on_the_closed_fingers_like_a_ring_on_a_hook_is_not_grasped()
     assert "stick came up hanging on the fingers" in result.reason
 
 
+def test_what_the_fingers_clamp_above_their_pads_is_grasped() -> None:
+    # an H on its side: the mounts, 11 mm behind the pads' planes, clamp its head of 30 mm from either side
+    head = Part(shape="box", size=(0.03, 0.015, 0.004), position=(0.0, 0.0, 0.022))
+    web = Part(shape="box", size=(0.03, 0.001, 0.018))
+    foot = Part(shape="box", size=(0.03, 0.02, 0.004), position=(0.0, 0.0, -0.022))
+    model = stick(0.052, mass=0.05, parts=(head, web, foot))
+    driver = driver_over(scene_with(model, 0), z=0.3)
+    grasp = grasp_of(driver, 0.052, 0.03)
+    result = execute_grasp(driver, grasp)
+    assert (result.outcome, result.lifted, result.between) == (Outcome.SUCCESS, "stick", ("stick",)), result
+    simulation = driver.simulation
+    touching = {simulation.model.geom(g).name for g in np.ravel(simulation.data.contact.geom)}
+    assert touching >= {"panda/left_mount", "panda/right_mount"}
+    assert not touching & {"panda/left_pad", "panda/right_pad"}
+    np.testing.assert_allclose(simulation.finger_forces()["stick"], 40.0, atol=1.0)
+    assert result.width == pytest.approx(0.008, abs=0.0005)
+
+
 def test_landing_on_an_object_is_a_collision() -> None:
     model = stick(0.03, width=0.06, length=0.15, mass=0.2)
     driver = driver_over(scene_with(model, 0))
