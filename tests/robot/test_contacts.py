@@ -49,11 +49,12 @@ def test_what_leans_against_one_finger_is_not_held(slope: float, pressing: int) 
 def test_a_finger_that_pushes_with_its_back_presses_outwards(shift: float) -> None:
     sim = Simulation(box_scene((0.06, 0.03, 0.04), mass=0.5))
     beside = np.array([CENTRE[0], CENTRE[1] - shift, 0.02])
+    above = beside + np.array([0.0, 0.0, 0.2])
     sim.close_gripper()
-    q = put(sim, *(beside + [0.0, 0.0, 0.2]))
+    q = put(sim, *above)
     sim.step(800)
-    q, _ = travel(sim, q, beside + [0.0, 0.0, 0.2], beside, 0.2)
-    travel(sim, q, beside, beside + [0.0, 0.6 * shift, 0.0], 0.05)
+    q, _ = travel(sim, q, above, beside, 0.2)
+    travel(sim, q, beside, beside + np.array([0.0, 0.6 * shift, 0.0]), 0.05)
     forces = sim.finger_forces()["box_0"]
     assert forces.min() < -1.0
     assert forces.max() == 0.0
@@ -62,7 +63,7 @@ def test_a_finger_that_pushes_with_its_back_presses_outwards(shift: float) -> No
 
 @pytest.mark.parametrize("mass", [0.05, 0.3, 1.0])
 def test_what_lies_wedged_on_the_diagonals_is_pressed_by_its_weight_and_not_held(mass: float) -> None:
-    # a stirrup: its upper bar lies in the groove over the closed pads, its heavy lower one hangs below the tips
+    # a stirrup: its upper bar lies in the groove over the pads, its heavy lower one hangs below the tips
     stirrup = ObjectModel(
         name="stirrup",
         parts=(
