@@ -48,14 +48,14 @@ def run_clearing(
     config: ClearingConfig | None = None,
     recorder: Recorder | None = None,
 ) -> ClearingResult:
-    """Play one episode until the table is clear, the time is up or nothing more is found.
+    """Play one episode until nothing is left on the table, the time is up or nothing more is found.
 
     Args:
         scene_config: what is on the table; with a basket.
         seed: of the scene, the start pose and the sensor noise; 0 is a seed.
         detector: is reset before every attempt, with the truth of that moment where it reads it.
         controller: is reset before every attempt. One that has `remember_failure(position)` is then
-            told where grasps have failed since the last success, oldest first.
+            told where grasps have failed, or reaches were stopped, since the last success, oldest first.
         config: how the episode runs.
         recorder: is shown everything.
 
@@ -132,8 +132,9 @@ class Clearing:
     def _ending(self) -> Outcome | None:
         if self.time > self.config.time_limit:
             return Outcome.TIMEOUT
-        if not self._whereabouts()[2]:
-            return Outcome.SUCCESS
+        _, knocked_off, left = self._whereabouts()
+        if not left:
+            return Outcome.KNOCKED_OFF if knocked_off else Outcome.SUCCESS
         return Outcome.NO_GRASP if self._blind >= self.config.blind_attempts else None
 
     def _whereabouts(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
@@ -235,11 +236,19 @@ class Clearing:
             self._blind += 1
         else:
             self._blind = 0
-        if result.grasp is not None and result.outcome in FAILED_GRASPS:
-            self._failed_at.append(result.grasp.position)
+        if result.outcome in FAILED_GRASPS:
+            self._failed_at.append(self._aim() if result.grasp is None else result.grasp.position)
         elif result.outcome in (Outcome.SUCCESS, Outcome.DROPPED, Outcome.NO_GRASP):
             # the scene is another one, or nothing else is there to be tried
             self._failed_at.clear()
+
+    def _aim(self) -> FloatArray:
+        """Point (3,) that a stopped reach was about [m]: its grasp so far, or the place under the camera."""
+        grasp, frame = self.controller.final_grasp(), self.episode.frame
+        if grasp is not None:
+            return grasp.position
+        assert frame is not None, "a reach looks before it moves"
+        return np.append(frame.T_world_camera[:2, 3], 0.0)
 
     def _tally(self) -> None:
         """Keep what the driver has measured since its last reset."""

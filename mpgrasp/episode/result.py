@@ -99,7 +99,8 @@ class ClearingResult:
     """Result of one episode in which a table was to be cleared."""
 
     outcome: Outcome
-    """success: no object is left in the workspace; timeout; or no_grasp: nothing more was found to grasp."""
+    """success: all objects are in the basket; knocked_off: none is left in the workspace, but some lie
+    elsewhere; timeout; or no_grasp: nothing more was found to grasp."""
     picks: tuple[Pick, ...]
     """All attempts, in their order."""
     in_basket: tuple[str, ...]
@@ -126,7 +127,7 @@ class ClearingResult:
 
     @property
     def success(self) -> bool:
-        """True if the table is clear, be it that objects were knocked off it."""
+        """True if all objects are in the basket."""
         return self.outcome is Outcome.SUCCESS
 
     @property

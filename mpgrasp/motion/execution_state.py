@@ -51,7 +51,7 @@ class ExecutionState:
         self.tip_height = np.nan
         """Height of the finger tips over the table when they closed [m]."""
         self.between: tuple[str, ...] = ()
-        """Objects that touched both pads when the lift began."""
+        """Objects that the fingers clamped when the lift began."""
         self.width = np.nan
         """Opening of the gripper when the lift began [m]."""
         self._on_tick = on_tick

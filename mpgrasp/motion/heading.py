@@ -35,19 +35,23 @@ def reachable_yaw(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig | Non
     """Return the heading of the hand's x axis [rad]: the nearer one, unless only the other is in reach.
 
     A heading is in reach if IK finds a posture at the grasp, and if the whole way there, turn included, keeps
-    every joint clear of the margin at which differential IK would have to change its answer.
+    every joint clear of the margin at which differential IK would have to change its answer. Where neither
+    does, as over the table's near edge, where the elbow is folded, it is the one that comes less close.
     """
     config = config or ExecutionConfig()
     T = driver.T_desired
     here = float(np.arctan2(T[1, 0], T[0, 0]))
     near = nearest_yaw(grasp.angle + np.pi / 2, here)
     headings = (near, float(near - np.copysign(np.pi, near - here)))
-    found = [yaw for yaw in headings if _has_posture(driver, grasp, yaw)]
-    for yaw in found:
-        if _keeps_clear(driver, grasp, config, yaw):
+    spare: dict[float, float] = {}
+    for yaw in headings:
+        if not _has_posture(driver, grasp, yaw):
+            continue
+        spare[yaw] = _spare_room(driver, grasp, config, yaw)
+        if spare[yaw] >= -1e-9:
             return yaw
     # out of reach either way: go as far as the protective stop allows and let it say why
-    return found[0] if found else near
+    return max(spare, key=spare.__getitem__, default=near)
 
 
 def _has_posture(driver: ArmDriver, grasp: Grasp, yaw: float) -> bool:
@@ -59,22 +63,21 @@ def _has_posture(driver: ArmDriver, grasp: Grasp, yaw: float) -> bool:
     return True
 
 
-def _keeps_clear(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, yaw: float) -> bool:
-    """True if the way over the grasp, down and up again brings no joint closer to its margin than `SPARE`.
+def _spare_room(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, yaw: float) -> float:
+    """Return the least room beyond `SPARE` that the way to the grasp and up again leaves a joint [rad].
 
-    A joint that is closer already must not come closer still.
+    Of a joint that is closer to its margin already, the room beyond what it has now.
     """
     ik, q, T = driver.ik, np.array(driver.q, float), driver.T_desired
-    needed = np.minimum(SPARE, ik.room(q))
+    needed, least = np.minimum(SPARE, ik.room(q)), np.inf
     for target in _way(T, grasp, config, yaw):
         error = pose_error(T, target)
         steps = max(norm(error[:3]) / STEP_LENGTH, norm(error[3:]) / STEP_ANGLE)
         shares = np.linspace(0.0, 1.0, int(np.ceil(steps)) + 1)[1:]
         path = rehearse(ik, q, T, error, shares)
-        if np.any(ik.room(path) < needed - 1e-9):
-            return False
+        least = min(least, float(np.min(ik.room(path) - needed, initial=np.inf)))
         q, T = (path[-1] if len(path) else q), target
-    return True
+    return least
 
 
 def _way(T: FloatArray, grasp: Grasp, config: ExecutionConfig, yaw: float) -> list[FloatArray]:

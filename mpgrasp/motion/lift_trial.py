@@ -44,7 +44,7 @@ class LiftResult:
     lifted: str | None = None
     """The object that was lifted, held and shaken."""
     rise: float = 0.0
-    """Rise of the object that rose most between the pads, over its place of rest, at the end [m]."""
+    """Rise of the object that rose most between the fingers, over its place of rest, at the end [m]."""
     duration: float = 0.0
     """Simulated time [s]."""
 
@@ -125,11 +125,10 @@ class TrialPhases:
         self._lost = not state.between and state.width < 1e-3
 
     def lift(self, state: ExecutionState) -> None:
-        """Lift unless all is lost, as it is where no pad touches anything at the end."""
+        """Lift unless all is lost, as it is where no finger presses anything at the end."""
         if not self._lost:
             phases.lift(state)
-            left, right = self._hand.pad_contacts()
-            self._lost = not left | right
+            self._lost = not self._hand.finger_forces()
 
     def hold(self, state: ExecutionState) -> None:
         """Hold unless all is lost, until nothing creeps: what does not by then will not later."""

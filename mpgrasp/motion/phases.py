@@ -60,7 +60,7 @@ def _back_off(state: ExecutionState) -> None:
 
 
 def close(state: ExecutionState) -> None:
-    """Close the gripper until it comes to rest, and note what lies between the pads."""
+    """Close the gripper until it comes to rest, and note what the fingers clamp."""
     c, simulation = state.config, state.simulation
     simulation.close_gripper(c.grip_force)
     widths: list[float] = []
@@ -71,8 +71,7 @@ def close(state: ExecutionState) -> None:
         return len(widths) > 20 and max(widths[-12:]) - min(widths[-12:]) < 1e-4
 
     state.driver.wait(c.settle_time, state.tick, until=settled)
-    left, right = simulation.pad_contacts()
-    state.between = tuple(sorted(left & right))
+    state.between = tuple(sorted(simulation.held()))
     state.width = simulation.gripper_width
 
 

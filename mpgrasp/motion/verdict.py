@@ -27,7 +27,7 @@ class ExecutionResult:
     lifted: str | None = None
     """The object that was lifted, held and shaken."""
     between: tuple[str, ...] = ()
-    """Objects that touched both pads when the lift began."""
+    """Objects that the fingers clamped when the lift began."""
     reflex: Reflex | None = None
     contact_height: float | None = None
     """Height of the finger tips over the table at first contact [m]; None without contact."""
@@ -44,7 +44,7 @@ class ExecutionResult:
 def judge(state: ExecutionState) -> ExecutionResult:
     """Judge an execution after its last phase, or after the protective stop that ended it.
 
-    Success takes an object that touches both pads, `success_height` or more above its place of rest.
+    Success takes an object that both fingers clamp, `success_height` or more above its place of rest.
     """
     outcome, reason, lifted = _verdict(state)
     return ExecutionResult(
@@ -66,14 +66,13 @@ def _verdict(state: ExecutionState) -> tuple[ExecutionOutcome, str, str | None]:
     c, reflex, rest = state.config, state.driver.reflex, state.rest
     if reflex is not None:
         return Outcome.REFLEX, f"{reflex} while in phase {state.phase}", None
-    left, right = state.simulation.pad_contacts()
     raised = [name for name in rest if state.height_of(name) - rest[name] >= c.success_height]
-    for name in sorted(left & right):
+    for name in sorted(state.simulation.held()):
         if name in raised:
             return Outcome.SUCCESS, f"{name} is held", name
     if state.between:
         names = ", ".join(state.between)
-        return Outcome.SLIPPED, f"{names} was between the pads and was lost", None
+        return Outcome.SLIPPED, f"{names} was between the fingers and was lost", None
     met, planned = state.contact_height, state.planned
     if met is not None and met > max(c.support_band, planned + 0.002):
         reason = (
@@ -83,6 +82,6 @@ def _verdict(state: ExecutionState) -> tuple[ExecutionOutcome, str, str | None]:
         return Outcome.COLLISION, reason, None
     if raised:
         # a ring on a hook: no grasp, for nothing but luck keeps it there
-        reason = f"{', '.join(raised)} came up hanging on the fingers, not between the pads"
+        reason = f"{', '.join(raised)} came up hanging on the fingers, which do not clamp it"
         return Outcome.MISSED, reason, None
-    return Outcome.MISSED, "nothing stood between the closed pads", None
+    return Outcome.MISSED, "nothing stood between the closed fingers", None

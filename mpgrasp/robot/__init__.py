@@ -1,1 +1,1 @@
-"""The robot as MuJoCo sees it: the arm, its hand, and the contacts of the pads."""
+"""The robot as MuJoCo sees it: the arm, its hand, and the contacts of its fingers."""

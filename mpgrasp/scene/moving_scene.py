@@ -9,7 +9,7 @@ import mujoco
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
 from mpgrasp.robot import hand
-from mpgrasp.robot.contacts import PadContacts
+from mpgrasp.robot.contacts import FingerContacts
 from mpgrasp.robot.gripper import GripperDrive
 from mpgrasp.scene.scene import Scene
 
@@ -26,7 +26,7 @@ class MovingScene(ABC):
         self.model: mujoco.MjModel = scene.model
         self.data = mujoco.MjData(self.model)
         self._gripper = GripperDrive(self.model, self.data)
-        self._pad_contacts = PadContacts(self.model, self.data, scene.objects)
+        self._finger_contacts = FingerContacts(self.model, self.data, scene.objects)
         self._stale = False  # True while poses and contacts lag behind the joint positions
 
     @property
@@ -56,10 +56,15 @@ class MovingScene(ABC):
         """
         self._gripper.close(force)
 
-    def pad_contacts(self) -> tuple[set[str], set[str]]:
-        """Names of the objects that press against the face of the left and of the right pad."""
+    def finger_forces(self) -> dict[str, FloatArray]:
+        """Forces (2,) with which the left and the right finger press an object inwards, by name [N]."""
         self.refresh()
-        return self._pad_contacts.objects()
+        return self._finger_contacts.forces()
+
+    def held(self) -> set[str]:
+        """Names of the objects that the fingers clamp from both sides."""
+        self.refresh()
+        return self._finger_contacts.held()
 
     def object_pose(self, name: str) -> FloatArray:
         """Pose (4, 4) of an object's body frame in the world.

@@ -165,7 +165,7 @@ def test_a_grasp_beside_the_object_misses() -> None:
     words = LastWords()
     result = run_episode(SCENE, 2, detector=Blind(), controller=controller, config=QUICK, recorder=words)
     assert result.outcome is Outcome.MISSED
-    assert words.heard == "missed: nothing stood between the closed pads"
+    assert words.heard == "missed: nothing stood between the closed fingers"
 
 
 def test_driving_out_of_reach_ends_in_a_reflex_that_names_its_limit() -> None:

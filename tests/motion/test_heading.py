@@ -11,6 +11,7 @@ import pytest
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, line_angle_difference, looking_down
 from mpgrasp.grasp import Grasp
+from mpgrasp.motion import heading
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.heading import nearest_yaw, reachable_yaw
@@ -81,9 +82,11 @@ WINDING = Grasp(position=np.array([0.463, -0.089, 0.005]), angle=-0.777, width=0
 """After the shorter turn to it from a heading of -1.11, the wrist meets its limit on the way up."""
 
 
-def driver_after_a_reach() -> ArmDriver:
+def driver_after_a_reach(
+    q: tuple[float, ...] = (-0.095, 0.349, -0.123, -2.03, 0.06, 2.375, 1.641),
+) -> ArmDriver:
     driver = driver_at((0.585, -0.127, 0.172), -1.11)
-    driver.simulation.set_q(np.array([-0.095, 0.349, -0.123, -2.03, 0.06, 2.375, 1.641]))
+    driver.simulation.set_q(np.array(q))
     driver.reset()
     return driver
 
@@ -104,6 +107,25 @@ def test_the_turn_that_was_not_taken_ends_in_a_stop_that_names_the_wrist() -> No
     approach(driver, WINDING, nearest_yaw(WINDING.angle + np.pi / 2, -1.11))
     assert driver.reflex is not None
     assert (driver.reflex.limit, driver.reflex.joint) == ("joint_position", 7)
+
+
+FOLDED = (0.4116, -0.3479, 0.4467, -2.8671, 0.2613, 2.5349, 0.9826)
+"""Joint positions over the near edge of the table: the elbow is close to its limit whatever the heading."""
+
+
+def test_where_neither_heading_keeps_clear_the_one_that_comes_less_close_is_taken() -> None:
+    grasp = Grasp(position=np.array([0.2416, 0.197, 0.01]), angle=0.5455, width=0.03, quality=1.0)
+    near = nearest_yaw(grasp.angle + np.pi / 2, 0.42)
+    stops = {}
+    for yaw in (near, near + np.pi):
+        driver = driver_after_a_reach(FOLDED)
+        approach(driver, grasp, yaw)
+        stops[yaw] = driver.reflex
+    assert stops[near] is not None
+    assert stops[near + np.pi] is None
+    driver = driver_after_a_reach(FOLDED)
+    assert not any(heading._spare_room(driver, grasp, ExecutionConfig(), yaw) >= 0 for yaw in stops)
+    assert reachable_yaw(driver, grasp) == pytest.approx(near + np.pi)
 
 
 def test_the_heading_that_is_chosen_is_reached_without_a_stop_wherever_the_reach_ended() -> None:

@@ -99,6 +99,17 @@ def test_a_stick_of_four_and_a_half_millimetres_on_an_uneven_cloth_is_lifted(see
     assert result.outcome is Outcome.SUCCESS, result.reason
 
 
+def test_what_the_fingers_clamp_above_their_pads_is_lifted() -> None:
+    # an H on its side, whose head of 30 mm the parts above the pads reach first
+    head = Part(shape="box", size=(0.03, 0.015, 0.004), position=(0.0, 0.0, 0.022))
+    web = Part(shape="box", size=(0.03, 0.001, 0.018))
+    foot = Part(shape="box", size=(0.03, 0.02, 0.004), position=(0.0, 0.0, -0.022))
+    scene = scene_with(block(0.06, 0.03, 0.052, mass=0.05, parts=(head, web, foot)))
+    result = attempt(scene, grasp_of(scene, 0.052, 0.03))
+    assert (result.outcome, result.lifted) == (Outcome.SUCCESS, "block"), result.reason
+    assert result.rise == pytest.approx(ExecutionConfig().lift, abs=0.005)
+
+
 def test_what_weighs_more_than_friction_holds_slips() -> None:
     # two pads of 40 N at a friction of 0.3 hold 24 N
     light, heavy = (scene_with(block(*BOX, mass=mass, friction=0.3)) for mass in (1.0, 4.0))

@@ -21,7 +21,7 @@ def test_box_is_lifted_whatever_its_thickness(size: tuple[float, float, float], 
     sim = Simulation(box_scene(size, mass=0.02))
     grasp(sim, size, hand.GRIPPER_FORCE_DEFAULT, offset)
     assert sim.object_pose("box_0")[2, 3] == pytest.approx(size[2] / 2 + 0.1, abs=0.004)
-    assert sim.pad_contacts() == ({"box_0"}, {"box_0"})
+    assert sim.held() == {"box_0"}
     assert sim.gripper_width == pytest.approx(size[1], abs=0.0005)
 
 
@@ -48,7 +48,7 @@ def test_released_object_falls() -> None:
     grasp(sim, SIZES[0], 40.0)
     sim.open_gripper(0.06)
     sim.step(300)
-    assert sim.pad_contacts() == (set(), set())
+    assert sim.finger_forces() == {}
     assert sim.object_pose("box_0")[2, 3] == pytest.approx(0.02, abs=1e-3)
 
 
@@ -160,7 +160,7 @@ def test_touching_down_at_descent_speed_is_felt_but_mild() -> None:
         sim.step(5)
         peak = max(peak, float(sim.external_force[2]))
     assert 5 < peak < 40
-    assert sim.pad_contacts() == (set(), set())
+    assert sim.finger_forces() == {}
 
 
 def test_external_force_is_what_pushes_on_the_tool() -> None:
@@ -189,7 +189,7 @@ def test_same_commands_give_the_same_bytes_and_queries_change_nothing() -> None:
             sim.step(5)
             if query:
                 contact_force(sim)
-                sim.pad_contacts()
+                sim.held()
                 sim.external_force  # noqa: B018
                 sim.object_pose("box_0")
         hashes.append(sim.state_hash())
@@ -241,4 +241,4 @@ def test_a_tip_that_stands_on_an_object_does_not_hold_it() -> None:
     sim.step(400)
     travel(sim, q, above, above - [0.0, 0.0, 0.0215], 0.05)
     assert contact_force(sim) > 1.0
-    assert sim.pad_contacts() == (set(), set())
+    assert sim.finger_forces() == {}

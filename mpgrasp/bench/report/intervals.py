@@ -31,6 +31,12 @@ def time_text(summary: CellSummary) -> str:
     return f"{summary.mean_time_s:.1f} s" + ("" if low is None else f" [{low:.1f}-{high:.1f}]")
 
 
+def stops_text(summary: CellSummary) -> str:
+    """Number of protective stops, and in brackets that of those in a singular posture, where it is known."""
+    known = summary.singularities is not None
+    return f"{summary.reflex_stops}" + (f" ({summary.singularities})" if known else "")
+
+
 def p_text(p: float) -> str:
     """A p value, with a star where it is significant."""
     return f"{p:.3g}" + (" *" if p < SIGNIFICANCE else "")

@@ -113,6 +113,8 @@ def _what_happened(line: Line, run: Run) -> str:
         return f"error: {line.error}" + (f", see `{run.folder / line.traceback}`" if line.traceback else "")
     if isinstance(line, ClearingLine) and line.left:
         return f"{line.outcome}: {len(line.left)} objects left"
+    if isinstance(line, ClearingLine) and line.knocked_off:
+        return f"{line.outcome}: {len(line.knocked_off)} objects beside the basket"
     return f"{line.outcome}" + (f": {line.reflex.text}" if line.reflex else "")
 
 

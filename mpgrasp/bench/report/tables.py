@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import fmean
 
+from mpgrasp.bench.analysis.summary import SINGULARITY
 from mpgrasp.bench.record import Cell, played
 from mpgrasp.bench.report.document import Table
 from mpgrasp.bench.report.evaluation import Evaluation
-from mpgrasp.bench.report.intervals import counts_text, success_text, time_text
+from mpgrasp.bench.report.intervals import counts_text, stops_text, success_text, time_text
 from mpgrasp.bench.report.names import name_of
 from mpgrasp.bench.results.runs import Runs
 from mpgrasp.episode.stages import STAGES
@@ -81,12 +82,19 @@ def motion_table(evaluation: Evaluation) -> Table:
     for cell, row in evaluation.summaries.items():
         medians = (f"{row.motion[key]:.3g}" if key in row.motion else "-" for key, _ in _MOTION)
         lowest = "-" if row.worst_singular_value is None else f"{row.worst_singular_value:.3g}"
-        rows.append((cell.suite, name_of(cell.method), str(row.reflex_stops), lowest, *medians))
+        rows.append((cell.suite, name_of(cell.method), stops_text(row), lowest, *medians))
     return Table(
         caption="How the arm moved: medians over episodes",
-        headings=("suite", "cell", "reflex stops", "smallest singular value", *(h for _, h in _MOTION)),
+        headings=(
+            "suite",
+            "cell",
+            "reflex stops (singular)",
+            "smallest singular value",
+            *(h for _, h in _MOTION),
+        ),
         rows=rows,
-        note="Smallest singular value of the tool's Jacobian (m, rad); - where it was not measured.",
+        note="Smallest singular value of the tool's Jacobian (m, rad); - where it was not measured. "
+        f"Singular: stops that ended an attempt in which it had fallen below {SINGULARITY:g}.",
     )
 
 

@@ -20,6 +20,7 @@ from rich.table import Table
 
 from mpgrasp.bench.analysis.summary import CellSummary, ClearingCounts, PairedTest
 from mpgrasp.bench.record import ErrorLine, Line, played
+from mpgrasp.bench.report.intervals import stops_text
 from mpgrasp.statistics import SIGNIFICANCE
 
 PIPED_WIDTH = 160
@@ -39,7 +40,7 @@ def result_table(cells: Sequence[CellSummary]) -> Table:
         "95 %\ninterval",
         "median\ntime s",
         "mean time s\n(95 %)",
-        "reflex\nstops",
+        "stops\n(singular)",
     )
     for heading in (*headings, *(["errors"] if errors else [])):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -60,7 +61,7 @@ def result_table(cells: Sequence[CellSummary]) -> Table:
             f"{100 * cell.wilson_low:.1f}-{100 * cell.wilson_high:.1f}",
             _number(cell.median_time_s),
             _with_interval(cell.mean_time_s, cell.mean_time_low, cell.mean_time_high),
-            str(cell.reflex_stops),
+            stops_text(cell),
             *([str(cell.errors)] if errors else []),
             _causes(cell.failures),
             *(_clearing(cell.clearing) if clearing else []),

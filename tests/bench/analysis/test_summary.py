@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from bench_runs import error_row, grasp_row, stop_row
+from bench_runs import clearing_row, error_row, grasp_row, pick_row, stop_row
 
-from mpgrasp.bench.analysis.summary import ObjectCounts, paired_tests, summarise
-from mpgrasp.bench.record import Line, line_of
+from mpgrasp.bench.analysis.summary import SINGULARITY, CellSummary, ObjectCounts, paired_tests, summarise
+from mpgrasp.bench.record import Line, line_of, record_of
+from mpgrasp.bench.report.intervals import stops_text
+from mpgrasp.motion.trajectory import MotionConfig
 
 
 def line(success: bool = True, outcome: str = "success", **other: Any) -> Line:
@@ -81,6 +83,38 @@ def test_the_way_of_the_arm_is_given_by_medians_and_the_worst_singular_value() -
 def test_reflex_stops_are_counted_by_their_cause() -> None:
     stops = [line(False, "reflex", reflex=stop_row(limit=limit)) for limit in ("b", "a", "b")]
     assert summarise(stops)[0].reflexes == {"a": 1, "b": 2}
+
+
+def test_a_stop_is_one_of_a_singularity_below_the_level_that_counts_as_near_one() -> None:
+    assert MotionConfig().singularity_warning == SINGULARITY
+    stopped = [
+        line(False, "reflex", reflex=stop_row(), min_singular_value=value)
+        for value in (0.008, 0.049, 0.05, None)
+    ]
+    (cell,) = summarise([*stopped, line(min_singular_value=0.01)])
+    assert (cell.reflex_stops, cell.singularities) == (4, 2)
+    assert stops_text(cell) == "4 (2)"
+
+
+def test_singularities_of_a_clearing_are_those_of_its_attempts() -> None:
+    stop = stop_row()
+    picks = [
+        pick_row(success=False, outcome="reflex", reflex=stop, min_singular_value=0.01),
+        pick_row(success=False, outcome="reflex", reflex=stop, min_singular_value=0.2),
+        pick_row(min_singular_value=0.01),
+    ]
+    table = line_of(clearing_row(picks=picks, stops=[stop] * 3, reflex=stop, min_singular_value=0.01))
+    (cell,) = summarise([table])
+    assert (cell.reflex_stops, cell.singularities) == (3, 1)
+
+
+def test_singularities_that_nobody_measured_are_not_in_the_row_and_a_row_without_them_is_read() -> None:
+    (cell,) = summarise([line(False, "reflex", reflex=stop_row())])
+    assert cell.singularities is None
+    row = cell.as_row()
+    assert "singularities" not in row
+    assert record_of(CellSummary, row).as_row() == row
+    assert stops_text(cell) == "1"
 
 
 def test_every_two_cells_of_a_suite_are_tested_over_common_worlds() -> None:

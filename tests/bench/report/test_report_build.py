@@ -12,7 +12,7 @@ from typing import Any
 
 import fakes
 import pytest
-from bench_runs import PLUG_INS, detector_row
+from bench_runs import PLUG_INS, detector_row, stop_row
 from msgspec.structs import replace as changed
 from toy_runs import CARD, EPISODES, lines, make_run, show, trace
 
@@ -178,6 +178,29 @@ def test_objects_are_told_apart_and_refused_meshes_are_named(tmp_path: Path) -> 
     tables = markdown_tables((run / "report.md").read_text())
     assert [["object", "DHRNet + MP-PC"], ["jug", "2/2"], ["mug", "1/2"]] in tables
     assert [["mesh", "why"], ["sieve", "open: 120 edges"]] in tables
+
+
+def test_a_table_with_objects_knocked_off_is_a_failure_and_says_how_many(tmp_path: Path) -> None:
+    off = {"outcome": "knocked_off", "knocked_off": ["mug", "jug"], "in_basket": ["pen"]}
+    run = make_run(tmp_path / "run", lines("0", time_limit_s=900.0, **off))
+    write_report([run], run)
+    (failures,) = [t for t in markdown_tables((run / "report.md").read_text()) if "what happened" in t[0]]
+    assert failures[1][failures[0].index("what happened")] == "knocked_off: 2 objects beside the basket"
+
+
+def test_singular_stops_stand_in_brackets_behind_all(tmp_path: Path) -> None:
+    stop = {"outcome": "reflex", "reflex": stop_row()}
+    stopped = [
+        changed(lines("0", min_singular_value=value, **stop)[0], episode=episode)
+        for episode, value in enumerate((0.01, 0.04, 0.2))
+    ]
+    run = make_run(tmp_path / "run", [*stopped, *lines("1", controller="mvp", min_singular_value=None)])
+    write_report([run], run)
+    (motion,) = [
+        t for t in markdown_tables((run / "report.md").read_text()) if "reflex stops (singular)" in t[0]
+    ]
+    column = motion[0].index("reflex stops (singular)")
+    assert [row[column] for row in motion[1:]] == ["3 (2)", "0"]
 
 
 def test_without_card_and_pairs_the_report_says_so(tmp_path: Path) -> None:

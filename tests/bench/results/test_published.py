@@ -16,7 +16,7 @@ import pytest
 
 from mpgrasp.bench.analysis.summary import paired_tests, summarise
 from mpgrasp.bench.record import Cell, played
-from mpgrasp.bench.results.reader import read_lines
+from mpgrasp.bench.results.reader import read_lines, read_summary
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -145,7 +145,11 @@ def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
     lines = read_lines(path.parent).lines
     summary = json.loads(path.read_text(encoding="utf-8"))
     for key, found in (("cells", summarise(lines)), ("paired_tests", paired_tests(lines))):
-        assert_alike([row.as_row() for row in found], summary[key], key)
+        ours = [row.as_row() for row in found]
+        for row, published in zip(ours, summary[key], strict=True):
+            if "singularities" not in published:  # of before they were counted
+                row.pop("singularities", None)
+        assert_alike(ours, summary[key], key)
     finished = played(lines)
     counts = Counter(line.task.cell for line in finished)
     successes = Counter(line.task.cell for line in finished if line.success)
@@ -154,3 +158,10 @@ def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
     cells = {Cell(cell["suite"], cell["detector"], cell["controller"]): cell for cell in summary["cells"]}
     assert {key: cell["n"] for key, cell in cells.items() if cell["n"]} == counts
     assert {key: cell["successes"] for key, cell in cells.items() if cell["successes"]} == successes
+
+
+@pytest.mark.parametrize("path", sorted(RESULTS.rglob("summary.json")), ids=folder_of)
+def test_a_published_summary_is_read_without_losing_or_adding_a_byte(path: Path) -> None:
+    summary = read_summary(path.parent)
+    assert summary is not None
+    assert json.dumps(summary.as_row(), indent=2) + "\n" == path.read_text(encoding="utf-8")
