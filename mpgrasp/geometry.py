@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpgrasp.linear_algebra import dot, norm, product
+
 FloatArray = NDArray[np.floating]
 
 
@@ -23,12 +25,12 @@ def transform(rotation: ArrayLike, position: ArrayLike) -> FloatArray:
 def invert(T: FloatArray) -> FloatArray:
     """Inverse (4, 4) of a rigid transform, exact because the rotation is orthonormal."""
     R = T[:3, :3]
-    return transform(R.T, -R.T @ T[:3, 3])
+    return transform(R.T, -product(R.T, T[:3, 3]))
 
 
 def transform_points(T: FloatArray, points: FloatArray) -> FloatArray:
     """Map points (..., 3) [m] by T (4, 4)."""
-    return points @ T[:3, :3].T + T[:3, 3]
+    return np.asarray(np.einsum("...j,kj->...k", points, T[:3, :3]) + T[:3, 3])
 
 
 def rotation_x(angle: float) -> FloatArray:
@@ -41,6 +43,13 @@ def rotation_z(angle: float) -> FloatArray:
     """Rotation (3, 3) about z."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_about(axis: ArrayLike, angle: float) -> FloatArray:
+    """Rotation (3, 3) by an angle [rad] about an axis (3,) of any length."""
+    x, y, z = np.asarray(axis, float) / norm(axis)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * product(K, K))
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
@@ -63,7 +72,7 @@ def looking_down(position: ArrayLike, yaw: float = 0.0) -> FloatArray:
     It serves both the tool (approach along +z) and an OpenCV camera (optical axis +z). At yaw 0 the
     axes are x = world x, y = -world y, z = -world z.
     """
-    return transform(rotation_z(yaw) @ np.diag([1.0, -1.0, -1.0]), position)
+    return transform(rotation_z(yaw) * np.array([1.0, -1.0, -1.0]), position)
 
 
 def look_at(eye: ArrayLike, target: ArrayLike, x_axis: ArrayLike = (1.0, 0.0, 0.0)) -> FloatArray:
@@ -74,10 +83,10 @@ def look_at(eye: ArrayLike, target: ArrayLike, x_axis: ArrayLike = (1.0, 0.0, 0.
     """
     eye = np.asarray(eye, float)
     z = np.asarray(target, float) - eye
-    z /= np.linalg.norm(z)
+    z /= norm(z)
     x = np.asarray(x_axis, float)
-    x = x - (x @ z) * z
-    x /= np.linalg.norm(x)
+    x = x - dot(x, z) * z
+    x /= norm(x)
     return transform(np.column_stack([x, np.cross(z, x), z]), eye)
 
 
@@ -102,11 +111,12 @@ def line_angle_difference(a: ArrayLike, b: ArrayLike) -> FloatArray:
 def rotation_vector(R: FloatArray) -> FloatArray:
     """Axis times angle (3,) [rad] of a rotation (3, 3); the logarithm map of SO(3)."""
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine, cosine = np.linalg.norm(axis) / 2, (np.trace(R) - 1) / 2
+    sine, cosine = norm(axis) / 2, (np.trace(R) - 1) / 2
     angle = np.arctan2(sine, cosine)
     if angle < 1e-9:
         return axis / 2
     if sine < 1e-6:  # half a turn: the axis is the eigenvector of eigenvalue 1
-        values, vectors = np.linalg.eigh((R + R.T) / 2)
-        return np.asarray(vectors[:, np.argmax(values)] * angle)
+        square = (R + R.T) / 4 + np.eye(3) / 2  # axis times itself, (3, 3)
+        column = square[:, np.argmax(np.diagonal(square))]
+        return np.asarray(column / norm(column) * angle)
     return np.asarray(axis / (2 * sine) * angle)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import dot, product
 
 _FLAT = 1e-5
 """Vertices may stand out over a face this far [m], and faces this alike are one."""
@@ -50,14 +51,14 @@ class Solid:
             (n,) inverse depth [1/m] where the rays enter, inf for a start within, and (n,) where they leave.
             A ray meets the solid if it enters at a positive one, no less than that where it leaves.
         """
-        distance = self.planes[:, 3] - self.planes[:, :3] @ origin
+        distance = self.planes[:, 3] - product(self.planes[:, :3], origin)
         # a start on a face's plane sees that face edge-on: a huge slope stands for the infinite one
         distance = np.where(np.abs(distance) < _TINY, _TINY, distance)
-        slopes = np.asarray((self.planes[:, :3] @ rotation) / distance[:, None], np.float32)
+        slopes = np.asarray(product(self.planes[:, :3], rotation) / distance[:, None], np.float32)
         near, away = slopes[distance < 0], slopes[distance > 0]
         n = rays.shape[1]
-        enter = (near @ rays).min(axis=0) if len(near) else np.full(n, np.inf, np.float32)
-        leave = (away @ rays).max(axis=0) if len(away) else np.full(n, -np.inf, np.float32)
+        enter = product(near, rays).min(axis=0) if len(near) else np.full(n, np.inf, np.float32)
+        leave = product(away, rays).max(axis=0) if len(away) else np.full(n, -np.inf, np.float32)
         if self.scale is not None:
             first, last = _round(self.scale, rotation, origin - self.centre, rays)
             np.minimum(enter, first, out=enter)
@@ -94,8 +95,8 @@ def _round(
     scale: FloatArray, rotation: FloatArray, start: FloatArray, rays: NDArray[np.float32]
 ) -> tuple[FloatArray, FloatArray]:
     """Inverse depths (n,) where rays enter and leave an ellipsoid or tube about the origin."""
-    p, d = scale * start, (scale[:, None] * rotation) @ rays.astype(float)
-    a, b, c = np.einsum("in,in->n", d, d), p @ d, float(p @ p - 1)
+    p, d = scale * start, product(scale[:, None] * rotation, rays.astype(float))
+    a, b, c = np.einsum("in,in->n", d, d), product(d.T, p), dot(p, p) - 1
     if abs(c) < _TINY:
         c = _TINY
     square = b * b - a * c
@@ -120,7 +121,7 @@ def _convex_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Solid, ...]:
     solid = area > 1e-12  # [m2]; slivers have no direction, and their neighbours close the body
     normals, a = normals[solid] / area[solid, None], a[solid]
     offsets = np.einsum("ij,ij->i", normals, a)
-    if not len(normals) or ((normals @ vertices.T).max(axis=1) - offsets).max() > _FLAT:
+    if not len(normals) or (product(normals, vertices.T).max(axis=1) - offsets).max() > _FLAT:
         return ()
     planes = np.column_stack([normals, offsets])
     _, first = np.unique(np.round(planes / _FLAT), axis=0, return_index=True)

@@ -18,7 +18,8 @@ from mpgrasp.camera.convex_rays import Solid, solids
 from mpgrasp.camera.height_field_rays import height_field_depth
 from mpgrasp.camera.rasteriser import FAR, NEAR
 from mpgrasp.depth import CameraIntrinsics
-from mpgrasp.geometry import FloatArray
+from mpgrasp.geometry import FloatArray, invert, transform_points
+from mpgrasp.linear_algebra import product
 
 Image = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -51,7 +52,7 @@ def cast_rays(
 ) -> RayHits:
     """Depth, geom and normal at every pixel of an OpenCV camera at `T_world_camera` (4, 4)."""
     shape = (intrinsics.height, intrinsics.width)
-    directions = np.moveaxis(_pixel_rays(intrinsics), 0, -1).reshape(-1, 3) @ T_world_camera[:3, :3].T
+    directions = product(T_world_camera[:3, :3], _pixel_rays(intrinsics).reshape(3, -1)).T
     normal = np.zeros(directions.size)
     distance, geom = mujoco_rays(
         model, data, T_world_camera[:3, 3], directions, _groups(geom_groups), normal=normal
@@ -96,8 +97,8 @@ class RayCaster:
         for geom, window in self._in_view(data, T_world_camera):
             turn = data.geom_xmat[geom].reshape(3, 3).T
             rotation, origin = (
-                turn @ T_world_camera[:3, :3],
-                turn @ (T_world_camera[:3, 3] - data.geom_xpos[geom]),
+                product(turn, T_world_camera[:3, :3]),
+                product(turn, T_world_camera[:3, 3] - data.geom_xpos[geom]),
             )
             rays = self._rays32[:, *window]
             layers: list[tuple[Image, Mask | None]]
@@ -125,7 +126,7 @@ class RayCaster:
         """Have MuJoCo cast the rays of some pixels, at moving geoms or at `fixed` ones too."""
         if not where.any():
             return
-        directions = self._rays[:, where].T @ T[:3, :3].T
+        directions = product(T[:3, :3], self._rays[:, where]).T
         distance, _ = mujoco_rays(self._model, data, T[:3, 3], directions, self._groups, fixed=fixed)
         inverse[where] = np.fmax(inverse[where], 1 / distance)
 
@@ -140,9 +141,10 @@ class RayCaster:
         geoms = np.flatnonzero(seen)
         local = model.geom_aabb[geoms, None, :3] + model.geom_aabb[geoms, None, 3:] * _CORNERS
         world = (
-            local @ data.geom_xmat[geoms].reshape(-1, 3, 3).transpose(0, 2, 1) + data.geom_xpos[geoms, None]
+            np.einsum("gci,gji->gcj", local, data.geom_xmat[geoms].reshape(-1, 3, 3))
+            + data.geom_xpos[geoms, None]
         )
-        corners = (world - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
+        corners = transform_points(invert(T_world_camera), world)
         # what is left of a box beyond the near plane has its corners there too
         a, b = corners[:, _EDGES[0]], corners[:, _EDGES[1]]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -171,7 +173,7 @@ def _solid(solid: Solid, rotation: FloatArray, origin: FloatArray, rays: Image) 
 
 def _plane(size: FloatArray, rotation: FloatArray, origin: FloatArray, rays: Image) -> Image:
     """Inverse depth of the front of a plane geom, 0 where it is not met."""
-    x, y, z = np.tensordot(rotation.astype(np.float32), rays, axes=1)
+    x, y, z = np.einsum("ij,j...->i...", rotation.astype(np.float32), rays)
     if origin[2] <= 0:
         return np.zeros_like(x)
     inverse: Image = z * np.float32(-1 / origin[2])
@@ -186,7 +188,7 @@ def _height_field(
     model: mujoco.MjModel, field: int, rotation: FloatArray, origin: FloatArray, rays: Image
 ) -> tuple[Image, Mask]:
     """Inverse depth of a height field, 0 beside it; and the pixels where it is not known."""
-    x, y, z = np.tensordot(rotation.astype(np.float32), rays, axes=1)
+    x, y, z = np.einsum("ij,j...->i...", rotation.astype(np.float32), rays)
     depth, unknown = height_field_depth(model, field, origin, (x, y, z))
     unknown |= depth < NEAR
     depth[unknown] = np.inf

@@ -21,14 +21,16 @@ from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.camera.rasteriser import Rasteriser, require_gl
 from mpgrasp.camera.ray_caster import RayCaster
+from mpgrasp.camera.standing_errors import NO_ERRORS
 from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.linear_algebra import product
 
 WRIST = "panda/wrist"
 """Name of the camera in a model."""
 
-_MUJOCO_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+_MUJOCO_TO_OPENCV = np.array([1.0, -1.0, -1.0])
 _DEFAULT_NOISE = DepthNoise()
 _log = logging.getLogger(__name__)
 
@@ -79,6 +81,13 @@ class WristCamera:
         self._depth_rasteriser: Rasteriser | None = None
         self._colour_rasteriser: Rasteriser | None = None
         self._fine_rasteriser: Rasteriser | None = None
+        self.errors = NO_ERRORS
+        """Errors that stand for the episode; `capture` has them, `render` has none."""
+
+    @property
+    def image(self) -> CameraIntrinsics:
+        """Geometry of the image that is looked at: the frames' with the margin that the noise needs."""
+        return self._seen
 
     def pose(self, data: mujoco.MjData) -> FloatArray:
         """`T_world_camera` (4, 4) of the model's camera, OpenCV axes, as of the last forward kinematics."""
@@ -88,11 +97,20 @@ class WristCamera:
             raise CameraError(
                 "the model has no such camera", got=WRIST, allowed=names or "none in this model"
             )
-        return transform(data.cam_xmat[index].reshape(3, 3) @ _MUJOCO_TO_OPENCV, data.cam_xpos[index])
+        return transform(data.cam_xmat[index].reshape(3, 3) * _MUJOCO_TO_OPENCV, data.cam_xpos[index])
 
     def capture(self, data: mujoco.MjData, rng: np.random.Generator) -> DepthFrame:
-        """Depth that the sensor reports from the model's camera, noise included unless it is None."""
-        return self.render(data, self.pose(data), rng)
+        """Depth that the sensor reports from the model's camera, and the pose in which it is believed."""
+        T, errors = self.pose(data), self.errors
+        depth = self._depth(data, T)
+        pattern = None if errors.pattern is None else errors.pattern.at(float(data.time))
+        depth = self._measured(depth, rng, pattern)
+        if errors.patches is not None:
+            depth = np.where(errors.patches.lost(data, self._seen, T), np.float32(np.nan), depth)
+        frame = self._frame(data, T, depth)
+        if errors.calibration is None:
+            return frame
+        return replace(frame, T_world_camera=product(T, errors.calibration))
 
     def render(
         self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator | None = None
@@ -147,8 +165,15 @@ class WristCamera:
         """The part of an image that is wanted, without the margin that the noise needs."""
         return np.ascontiguousarray(depth[:, : self.intrinsics.width])
 
-    def _measured(self, depth: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
-        return depth if self.noise is None else sensor_noise.apply(depth, self._seen, rng, self.noise)
+    def _measured(
+        self,
+        depth: NDArray[np.float32],
+        rng: np.random.Generator,
+        pattern: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float32]:
+        if self.noise is None:
+            return depth
+        return sensor_noise.apply(depth, self._seen, rng, self.noise, pattern)
 
     def _colour_image(self, data: mujoco.MjData, T_world_camera: FloatArray) -> NDArray[np.uint8]:
         if self._colour_rasteriser is None:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.grasp import Grasp, GraspMap, image_to_world_angle
+from mpgrasp.linear_algebra import dot, product
 from mpgrasp.workspace import WORKSPACE_CENTRE
 
 EXTENT_AS_WRITTEN = 0.68
@@ -206,8 +207,8 @@ class GridMap:
     def _summary(self) -> tuple[FloatArray, FloatArray]:
         if self._fresh is None:
             centres = self.quality_centres.astype(np.float32)
-            sums = self.quality_counts @ np.column_stack([np.ones_like(centres), centres])  # (ny, nx, 2)
-            n, total = sums[..., 0], sums[..., 1]
+            n = np.einsum("yxq->yx", self.quality_counts)
+            total = np.einsum("yxq,q->yx", self.quality_counts, centres)
             mean = total / np.maximum(n, 1)
             if self.config.prior_in_mean:
                 # the same count in every bin: their mean is 0.5
@@ -226,8 +227,8 @@ class GridMap:
         Angles are doubled before averaging (a grasp is the same after half a turn); eq. 8 as printed
         would make 0 out of -89 and +89 degrees.
         """
-        weight = self.counts[cell] @ self.quality_centres  # (n_theta,)
-        s, c = weight @ np.sin(2 * self.angle_centres), weight @ np.cos(2 * self.angle_centres)
+        weight = product(self.counts[cell], self.quality_centres)  # (n_theta,)
+        s, c = dot(weight, np.sin(2 * self.angle_centres)), dot(weight, np.cos(2 * self.angle_centres))
         return float(wrap_half_pi(np.arctan2(s, c) / 2))
 
     def mean_width(self, cell: tuple[int, int]) -> float:

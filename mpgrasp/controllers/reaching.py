@@ -13,6 +13,7 @@ from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.controllers.information import exploration_cost, grid_entropy, information_gain, utility
 from mpgrasp.geometry import FloatArray, wrap_half_pi, wrap_pi
 from mpgrasp.grasp import Grasp, GraspMap, best_pixel, peak_height
+from mpgrasp.linear_algebra import dot, norm
 from mpgrasp.robot.limits import Q_HOME, Q_MAX, Q_MIN
 
 _TIE = 1e-3
@@ -65,7 +66,7 @@ class ReachingController:
         map_of_utility = self._evaluate(grasp_map, float(tcp[2, 3]))
         target = self._best_viewpoint(map_of_utility, viewpoint[:2])
         pull = (target - viewpoint[:2]) / config.window
-        velocity = config.v_1 * pull / max(1.0, float(np.linalg.norm(pull)))
+        velocity = config.v_1 * pull / max(1.0, norm(pull))
         height = peak_height(grasp_map.quality)
         exists = height > config.peak_threshold
         velocity = velocity * (1.0 if exists else config.alpha)
@@ -101,7 +102,7 @@ class ReachingController:
         c = self.config
         if c.descent == "constant":
             return c.v_z
-        return float(np.sqrt(max(c.v_1**2 - float(horizontal @ horizontal), 0.0)))
+        return float(np.sqrt(max(c.v_1**2 - dot(horizontal, horizontal), 0.0)))
 
     def diagnostics(self) -> dict[str, FloatArray | float | bool]:
         return dict(self._diagnostics)

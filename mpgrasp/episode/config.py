@@ -28,6 +28,9 @@ class EpisodeConfig:
     start_jitter: float = 0.05
     """Standard deviation of the first viewpoint about the workspace's centre, in x and in y [m]; drawn
     within two standard deviations."""
+    start_radius: float | None = None
+    """Radius of a disc about the workspace's centre in which the first viewpoint lies, anywhere alike [m], as
+    in the paper's Fig. 3; none = as `start_jitter` says."""
     max_reach_time: float = 20.0
     """A reach that takes longer is a timeout [s]."""
     camera_backend: str = "auto"
@@ -53,6 +56,8 @@ class EpisodeConfig:
                 raise ConfigError(f"{name} must be positive", got=getattr(self, name))
         if not self.start_jitter >= 0:
             raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
+        if self.start_radius is not None and not 0 <= self.start_radius <= 0.5:
+            raise ConfigError("start_radius", got=self.start_radius, allowed="0 to 0.5 [m], or none")
         if self.camera_backend not in BACKENDS:
             raise ConfigError("unknown camera backend", got=self.camera_backend, allowed=BACKENDS)
 

@@ -6,8 +6,10 @@ every controller meets the same world: the noise of a tick is drawn anew from (s
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,13 +17,15 @@ from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
 from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.latency import CommandQueue
 from mpgrasp.episode.metrics import ReachMetrics
 from mpgrasp.episode.result import EpisodeResult
-from mpgrasp.episode.seeds import controller_seed, noise_rng
+from mpgrasp.episode.seeds import controller_seed, force_rng, noise_rng
 from mpgrasp.episode.stages import StageClock
 from mpgrasp.episode.world import World
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution import execute_grasp
 from mpgrasp.motion.motion_statistics import MotionStatistics
@@ -109,6 +113,7 @@ class Episode:
         self.frame: DepthFrame | None = None
         """Image of the last look."""
         self._grasp_map: GraspMap | None = None
+        self._detect_seconds = 0.0
         self._clock = StageClock()
         self._last_record = -np.inf
         self.recorder.start(self.simulation)
@@ -119,6 +124,7 @@ class Episode:
         self.driver.reset()
         self.start_time, self._first_tick = self.simulation.time, self.ticks
         self.metrics = ReachMetrics()
+        self._commands = CommandQueue()
         self._grasp: Grasp | None = None
         self._reason = ""
         truth = reads_truth(self.detector)
@@ -128,8 +134,10 @@ class Episode:
         """Return the view of this tick; its noise depends on seed and tick alone, not on earlier looks."""
         with self.timed("render"):
             self.frame = self.camera.capture(self.simulation.data, noise_rng(self.seed, self.ticks))
-        with self.timed("detect"):
-            self._grasp_map = self.detector.predict(self.frame)
+        clock = time.perf_counter()
+        self._grasp_map = self._detect(self.frame)
+        self._detect_seconds = time.perf_counter() - clock
+        self._clock.add("detect", self._detect_seconds)
         time_s = self.simulation.time - self.start_time
         self.metrics.look(time_s, self._grasp_map)
         return Observation(
@@ -139,12 +147,20 @@ class Episode:
         )
 
     def act(self, command: Command, diagnostics: Mapping[str, FloatArray | float | bool]) -> None:
-        """Follow a command until the next tick; of one that is done, nothing but the gripper moves."""
+        """Follow a command until the next tick, or what was decided before as long as the latency lasts.
+
+        Of a command that is done, nothing but the gripper moves.
+        """
         self.ticks += 1
-        self.simulation.open_gripper(command.gripper)
-        before = self.driver.statistics()
-        if not command.done:
-            self.driver.drive(command.twist, self.config.control_dt, self.metrics.tick)
+        before, dt = self.driver.statistics(), self.driver.config.dt
+        for acting, ticks in self._commands.spans(command, self._delay(), round(self.config.control_dt / dt)):
+            if acting is not None:
+                self.simulation.open_gripper(acting.gripper)
+            twist = np.zeros(6) if acting is None else acting.twist
+            self.driver.drive(twist, ticks * dt, self.metrics.tick)
+        if command.done:
+            self.simulation.open_gripper(command.gripper)
+        else:
             after = self.driver.statistics()
             self._clock.add("ik", after.ik_seconds - before.ik_seconds)
             self._clock.add("physics", after.physics_seconds - before.physics_seconds)
@@ -171,7 +187,13 @@ class Episode:
             outcome = Outcome.NO_GRASP
         elif outcome is None and grasp is not None:
             self._grasp = grasp
-            execution = execute_grasp(self.driver, grasp, self.config.execution, on_tick=self.record_motion)
+            execution = execute_grasp(
+                self.driver,
+                grasp,
+                self.config.execution,
+                on_tick=self.record_motion,
+                rng=force_rng(self.seed, self.ticks),
+            )
             outcome, lifted = Outcome(execution.outcome), execution.lifted
             self._reason = execution.reason
         assert outcome is not None
@@ -193,6 +215,21 @@ class Episode:
     def close(self) -> None:
         """Free the camera."""
         self.world.close()
+
+    def _detect(self, frame: DepthFrame) -> GraspMap:
+        """Return what the detector finds, where the camera is believed to be.
+
+        A detector that knows the world's shape is told the true pose, and so errs by the calibration as well.
+        """
+        if not reads_truth(self.detector):
+            return self.detector.predict(frame)
+        true = replace(frame, T_world_camera=self.camera.pose(self.simulation.data))
+        return replace(self.detector.predict(true), T_world_camera=frame.T_world_camera)
+
+    def _delay(self) -> int:
+        """Time after which what was seen last acts [ticks of the velocity loop]."""
+        latency = self.config.camera.latency
+        return round((self._detect_seconds if latency == "measured" else latency) / self.driver.config.dt)
 
     def _result(self, outcome: Outcome, lifted: str | None, reach: MotionStatistics) -> EpisodeResult:
         whole = self.driver.statistics()
@@ -221,7 +258,7 @@ class Episode:
         position = self._grasp.position[:2]
         return min(
             self.scene.objects,
-            key=lambda name: float(np.linalg.norm(self.simulation.object_pose(name)[:2, 3] - position)),
+            key=lambda name: norm(self.simulation.object_pose(name)[:2, 3] - position),
         )
 
     def _verdict(self, outcome: Outcome) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import PEAK_QUALITY, GraspMap, peak_height
+from mpgrasp.linear_algebra import norm
 
 if TYPE_CHECKING:
     from mpgrasp.motion.arm_driver import ArmDriver
@@ -70,9 +71,9 @@ class ReachMetrics:
     def tick(self, driver: ArmDriver) -> None:
         """Take a tick of the velocity loop into account; can be handed to `ArmDriver.drive`."""
         velocity, self._dt = driver.twist_achieved[:3], driver.config.dt
-        self._speeds.append(float(np.linalg.norm(velocity)))
+        self._speeds.append(norm(velocity))
         if self.first_detection_s is None:
-            self.blind_drift_m += float(np.linalg.norm(velocity[:2])) * self._dt
+            self.blind_drift_m += norm(velocity[:2]) * self._dt
 
     @property
     def spectral_arc_length(self) -> float:

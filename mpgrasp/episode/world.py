@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mpgrasp.camera.fixed_pattern import FixedPattern
+from mpgrasp.camera.patches import Patches
+from mpgrasp.camera.standing_errors import StandingErrors, calibration_error
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.episode.config import EpisodeConfig
-from mpgrasp.episode.seeds import start_rng
-from mpgrasp.geometry import invert, looking_down
+from mpgrasp.episode.seeds import calibration_rng, patches_rng, pattern_rng, start_rng
+from mpgrasp.geometry import FloatArray, invert, looking_down
+from mpgrasp.linear_algebra import product
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.ik import DifferentialIK, solve_pose
 from mpgrasp.motion.reflex import ReflexMonitor
@@ -48,13 +52,32 @@ class World:
             crop=config.camera.crop,
             colour=colour,
         )
-        jitter = np.clip(start_rng(seed).standard_normal(2), -2, 2) * config.start_jitter
-        self.put_camera_above(np.array(WORKSPACE_CENTRE) + jitter, config.start_height)
+        self.camera.errors = self._standing_errors(scene_config, seed)
+        start = np.array(WORKSPACE_CENTRE) + _start_offset(config, start_rng(seed))
+        self.put_camera_above(start, config.start_height)
         self.driver = ArmDriver(
             self.simulation,
             config.motion,
             DifferentialIK(config.ik),
             ReflexMonitor(config.reflex),
+        )
+
+    def _standing_errors(self, scene: SceneConfig, seed: int) -> StandingErrors:
+        """Draw the errors of the camera that stand for the episode."""
+        camera, sensor, image = self._config.camera, self._config.sensor, self.camera.image
+        pattern = patches = None
+        if self._config.noise and sensor.fixed_pattern > 0:
+            shape, scale = (image.height, image.width), image.fx / sensor.focal_px
+            pattern = FixedPattern(sensor, shape, scale, pattern_rng(seed))
+        if scene.no_return > 0:
+            share, size = scene.no_return, scene.no_return_size
+            patches = Patches(self.scene.model, self.scene.objects, share, size, patches_rng(seed))
+        return StandingErrors(
+            calibration=calibration_error(
+                camera.calibration_translation, camera.calibration_rotation, calibration_rng(seed)
+            ),
+            pattern=pattern,
+            patches=patches,
         )
 
     def put_camera_above(self, position: ArrayLike, height: float) -> None:
@@ -68,9 +91,9 @@ class World:
             ConfigError: a place out of the arm's reach.
         """
         simulation = self.simulation
-        T_tcp_camera = invert(simulation.T_world_tcp) @ self.camera.pose(simulation.data)
+        T_tcp_camera = product(invert(simulation.T_world_tcp), self.camera.pose(simulation.data))
         T = looking_down([*np.asarray(position, float), height])
-        T[:2, 3] -= (T[:3, :3] @ T_tcp_camera[:3, 3])[:2]
+        T[:2, 3] -= product(T[:3, :3], T_tcp_camera[:3, 3])[:2]
         simulation.set_q(solve_pose(simulation.q, T))
 
     def configs(self) -> dict[str, Any]:
@@ -93,3 +116,11 @@ class World:
     def close(self) -> None:
         """Free the camera."""
         self.camera.close()
+
+
+def _start_offset(config: EpisodeConfig, rng: np.random.Generator) -> FloatArray:
+    """Draw the first viewpoint's offset (2,) from the workspace's centre [m]."""
+    if config.start_radius is None:
+        return np.asarray(np.clip(rng.standard_normal(2), -2, 2) * config.start_jitter)
+    radius, angle = config.start_radius * np.sqrt(rng.uniform()), rng.uniform(-np.pi, np.pi)
+    return np.asarray(radius * np.array([np.cos(angle), np.sin(angle)]))

@@ -15,6 +15,7 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.linear_algebra import norm, svd
 from mpgrasp.motion.ik import DifferentialIK
 from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.motion_statistics import MotionMeter, MotionStatistics
@@ -71,7 +72,7 @@ class ArmDriver:
             self.config,
             self.simulation.time,
             self.simulation.T_world_tcp[:3, 3],
-            float(np.linalg.svd(self.ik.jacobian(self.q), compute_uv=False)[-1]),
+            float(svd(self.ik.jacobian(self.q)).sigma[-1]),
         )
 
     @property
@@ -92,12 +93,12 @@ class ArmDriver:
     @property
     def touch(self) -> float:
         """External force on the robot over the last tick [N]: exact and instant, for feeling the way."""
-        return float(np.linalg.norm(self._forces[-1]))
+        return norm(self._forces[-1])
 
     @property
     def external_force(self) -> float:
         """External force on the robot, mean over `FORCE_WINDOW` ticks [N]: what a stop is judged by."""
-        return float(np.linalg.norm(np.mean(self._forces, axis=0)))
+        return norm(np.mean(self._forces, axis=0))
 
     @property
     def min_singular_value(self) -> float:
@@ -125,7 +126,7 @@ class ArmDriver:
                 self.drive(np.zeros(6), c.dt, on_tick)
                 continue
             twist = self.ramp.twist
-            linear = float(np.linalg.norm(twist[:3]))
+            linear = norm(twist[:3])
             keep = max(0.0, 1.0 - deceleration * c.dt / linear) if linear > 0 else 0.0
             self.ramp.reset(twist * keep)
             self._tick(integrate_pose(self.T_desired, self.ramp.twist, c.dt), on_tick)

@@ -19,7 +19,12 @@ OnPhase = Callable[[str, ArmDriver], None]
 
 
 def execute_grasp(
-    driver: ArmDriver, grasp: Grasp, config: ExecutionConfig | None = None, on_tick: OnPhase | None = None
+    driver: ArmDriver,
+    grasp: Grasp,
+    config: ExecutionConfig | None = None,
+    on_tick: OnPhase | None = None,
+    *,
+    rng: np.random.Generator | None = None,
 ) -> ExecutionResult:
     """Grasp, lift, hold, shake and judge.
 
@@ -28,6 +33,7 @@ def execute_grasp(
         grasp: what to grasp; its position lies on the seen surface.
         config: speeds, forces, times and heights.
         on_tick: is told the phase and the driver on every tick of the velocity loop.
+        rng: source of the noise on forces; one of a fixed seed by default.
 
     Returns:
         The verdict. A failed grasp is an outcome, never an exception.
@@ -39,7 +45,7 @@ def execute_grasp(
     told = None if on_tick is None else lambda phase: on_tick(phase, driver)
     config = config or ExecutionConfig()
     yaw = reachable_yaw(driver, grasp, config)
-    state = ExecutionState(driver, grasp, config, yaw=yaw, on_tick=told)
+    state = ExecutionState(driver, grasp, config, yaw=yaw, on_tick=told, rng=rng)
     state.play(PHASES)
     return judge(state)
 

@@ -36,6 +36,9 @@ class ExecutionConfig:
     plan itself ends higher."""
     contact_threshold: float = 3.0
     """Force that counts as contact [N]."""
+    force_noise: float = 0.0
+    """Standard deviation of white noise on each axis of the force that is felt, in every tick of the
+    velocity loop [N]: forces are estimated from the torques at the joints."""
     contact_deceleration: float = 1.5
     """Braking at contact [m/s2]."""
     back_off: float = 0.0005

@@ -8,6 +8,7 @@ import numpy as np
 
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import Grasp
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.driver import Driver
 from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.robot import hand
@@ -22,6 +23,7 @@ class ExecutionState:
         config: speeds, forces, times and heights.
         yaw: heading of the hand's x axis [rad].
         on_tick: is told the phase on every tick of the velocity loop.
+        rng: source of the noise on forces; one of a fixed seed by default.
     """
 
     def __init__(
@@ -32,6 +34,7 @@ class ExecutionState:
         *,
         yaw: float,
         on_tick: Callable[[str], None] | None = None,
+        rng: np.random.Generator | None = None,
     ) -> None:
         self.driver, self.grasp, self.config, self.yaw = driver, grasp, config, yaw
         self.simulation = driver.simulation
@@ -52,6 +55,7 @@ class ExecutionState:
         self.width = np.nan
         """Opening of the gripper when the lift began [m]."""
         self._on_tick = on_tick
+        self._rng = np.random.default_rng(0) if rng is None else rng
 
     def play(self, phases: Mapping[str, Phase]) -> None:
         """Play phases in order, up to a protective stop."""
@@ -81,6 +85,14 @@ class ExecutionState:
         """Tell the phase to whoever asked for it."""
         if self._on_tick is not None:
             self._on_tick(self.phase)
+
+    def felt(self) -> float:
+        """External force over the last tick as the robot feels it [N]; noise is drawn anew at each call."""
+        force, noise = self.driver.touch, self.config.force_noise
+        if noise == 0:
+            return force
+        # alike in all directions, so that of the force its length is enough
+        return norm(self._rng.normal(0.0, noise, 3) + np.array([force, 0.0, 0.0]))
 
     def tip(self) -> float:
         """Height of the finger tips over the table [m]."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.arm_driver import FORCE_WINDOW
 from mpgrasp.motion.reflex import Reflex, ReflexConfig
 from mpgrasp.motion.trajectory import MotionConfig, path_profile
@@ -35,7 +36,7 @@ class HandDriver:
     @property
     def touch(self) -> float:
         """External force on the hand over the last tick [N]."""
-        return float(np.linalg.norm(self._forces[-1]))
+        return norm(self._forces[-1])
 
     def move_to(
         self,
@@ -51,7 +52,7 @@ class HandDriver:
         start = self.T_desired[:3, 3]
         way = T_world_tcp[:3, 3] - start
         done = 0.0
-        for share in path_profile(float(np.linalg.norm(way)), 0.0, c, max_speed, c.max_rotation):
+        for share in path_profile(norm(way), 0.0, c, max_speed, c.max_rotation):
             self._tick(start + share * way, on_tick)
             if self.reflex is not None:
                 return False
@@ -83,7 +84,7 @@ class HandDriver:
 
     def _brake(self, velocity: FloatArray, deceleration: float, on_tick: OnTick | None) -> None:
         dt = self.config.dt
-        speed = float(np.linalg.norm(velocity))
+        speed = norm(velocity)
         while speed > 0 and self.reflex is None:
             slower = max(0.0, speed - deceleration * dt)
             velocity, speed = velocity * (slower / speed), slower
@@ -93,7 +94,7 @@ class HandDriver:
         hand, b = self.simulation, self.bounds
         hand.step(target, self._steps)
         self._forces.append(hand.external_force)
-        force = float(np.linalg.norm(sum(self._forces))) / FORCE_WINDOW
+        force = norm(sum(self._forces)) / FORCE_WINDOW
         for limit, value, bound in (
             ("contact_force", force, b.contact_force),
             ("tracking_position", hand.lag, b.tracking_position),

@@ -7,6 +7,7 @@ import numpy as np
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down, wrap_half_pi
 from mpgrasp.grasp import Grasp
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.time_scaling import rehearse
@@ -71,7 +72,7 @@ def _spare_room(driver: ArmDriver, grasp: Grasp, config: ExecutionConfig, yaw: f
     needed, least = np.minimum(SPARE, ik.room(q)), np.inf
     for target in _way(T, grasp, config, yaw):
         error = pose_error(T, target)
-        steps = max(np.linalg.norm(error[:3]) / STEP_LENGTH, np.linalg.norm(error[3:]) / STEP_ANGLE)
+        steps = max(norm(error[:3]) / STEP_LENGTH, norm(error[3:]) / STEP_ANGLE)
         shares = np.linspace(0.0, 1.0, int(np.ceil(steps)) + 1)[1:]
         path = rehearse(ik, q, T, error, shares)
         least = min(least, float(np.min(ik.room(path) - needed, initial=np.inf)))

@@ -19,7 +19,9 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.linear_algebra import least_norm, norm, product, svd
 from mpgrasp.motion.ik_config import IkConfig
+from mpgrasp.motion.ik_program import ClearanceLimit, ToolTask
 from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.trajectory import integrate_pose, pose_error
 from mpgrasp.robot import panda
@@ -44,12 +46,10 @@ class DifferentialIK:
         self.model = _arm_model() if model is None else model
         self.configuration = mink.Configuration(self.model, q=np.array(panda.Q_HOME))
         self._site = self.model.site(TCP_SITE).id
-        self._frame = mink.FrameTask(TCP_SITE, "site", position_cost=1.0, orientation_cost=1.0)
-        self._posture = mink.PostureTask(self.model, cost=self.config.posture_cost)
         margin = self.config.joint_margin
         self._q_min, self._q_max = self.model.jnt_range[:, 0] + margin, self.model.jnt_range[:, 1] - margin
         self._dq_max = np.array(panda.DQ_MAX) * self.config.velocity_fraction
-        self._collision_limits: dict[float, mink.CollisionAvoidanceLimit] = {}
+        self._collision_limits: dict[float, ClearanceLimit] = {}
         names = [self.model.joint(j).name for j in range(self.model.njnt)]
         self._limits: list[mink.Limit] = [
             mink.ConfigurationLimit(self.model, min_distance_from_limits=margin),
@@ -87,24 +87,23 @@ class DifferentialIK:
         """
         T = self.pose(q)
         J = self._jacobian()
-        U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
+        factors = svd(J)
         error = pose_error(T, T_world_tcp)
-        demanded = Vt.T @ ((U.T @ error) / np.maximum(sigma, 1e-9)) / dt
+        demanded = least_norm(factors, error, 1e-9) / dt
         # the elbow swings home within the null space alone, so it never pulls at the tool
         towards_home = panda.Q_HOME - q
-        towards_home = towards_home - Vt.T @ (Vt @ towards_home)
+        towards_home = towards_home - product(factors.Vt.T, product(factors.Vt, towards_home))
         if posture_rate is None:
             wish = self.config.posture_rate * towards_home
             self._swing += (wish - self._swing) * (dt / self.config.posture_smoothing)
             swing = self._swing
         else:
             swing = posture_rate * towards_home
-        self._posture.set_target(q + swing * dt)
-        self._frame.set_target(mink.SE3.from_matrix(T_world_tcp))
+        task = ToolTask(J, error, swing * dt, self.config.posture_cost)
         limits = [*self._limits, *self._collision_limit(dt)]
         try:
             dq = mink.solve_ik(
-                self.configuration, [self._frame, self._posture], dt, "daqp",
+                self.configuration, [task], dt, "daqp",
                 damping=self.config.damping, limits=limits,
             )  # fmt: skip
             feasible = bool(np.all(np.isfinite(dq)))
@@ -112,8 +111,8 @@ class DifferentialIK:
             feasible = False
         if not feasible:
             dq = np.zeros(7)
-        left = error - J @ dq * dt
-        residual, residual_angle = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
+        left = error - product(J, dq) * dt
+        residual, residual_angle = norm(left[:3]), norm(left[3:])
         blocked = self._joint_limit(q, dq, demanded, dt)
         if blocked is None and (residual > 1e-4 or residual_angle > 1e-3):
             blocked = self._collision()
@@ -121,8 +120,8 @@ class DifferentialIK:
         return IkSolution(
             dq=dq,
             demanded_dq=demanded,
-            manipulability=float(np.prod(sigma)),
-            min_singular_value=float(sigma[-1]),
+            manipulability=float(np.prod(factors.sigma)),
+            min_singular_value=float(factors.sigma[-1]),
             feasible=feasible,
             residual=residual,
             residual_angle=residual_angle,
@@ -153,11 +152,11 @@ class DifferentialIK:
             T = self.pose(q)
             error = pose_error(T, T_world_tcp)
             # 10 cm and half a radian at a time keep the linearisation honest
-            lengths = float(np.linalg.norm(error[:3])) / 0.1, float(np.linalg.norm(error[3:])) / 0.5
+            lengths = norm(error[:3]) / 0.1, norm(error[3:]) / 0.5
             target = integrate_pose(T, error, 1.0 / max(1.0, *lengths))
             dq = self.step(q, target, dt, posture_rate=0.2 / dt).dq
             # what is left of the motion once the tool has arrived is the elbow's
-            if np.linalg.norm(error) < tolerance and np.linalg.norm(dq) * dt < 1e-3:
+            if norm(error) < tolerance and norm(dq) * dt < 1e-3:
                 return q
             q = q + dq * dt
         raise ConfigError(
@@ -178,7 +177,7 @@ class DifferentialIK:
             c = self.config
             # mink bounds the step, not the velocity, by gain * distance / dt: with the gain it calls
             # ordinary the limit is a wall that is met at full speed, so scale the gain by dt twice
-            self._collision_limits[dt] = mink.CollisionAvoidanceLimit(
+            self._collision_limits[dt] = ClearanceLimit(
                 self.model, self._pairs, gain=c.collision_rate * dt * dt,
                 minimum_distance_from_collisions=c.collision_distance,
                 collision_detection_distance=c.collision_range,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.trajectory import MotionConfig
 
@@ -80,7 +81,7 @@ class MotionMeter:
             velocity: (3,) measured velocity of the tool point [m/s].
         """
         dt = self._config.dt
-        acceleration = float(np.linalg.norm(twist[:3] - self.twist[:3])) / dt
+        acceleration = norm(twist[:3] - self.twist[:3]) / dt
         self._max_acceleration = max(self._max_acceleration, acceleration)
         self.twist = twist
         self._max_ddq = np.maximum(self._max_ddq, np.abs(solution.dq - self._dq) / dt)
@@ -88,9 +89,9 @@ class MotionMeter:
         self._dq = solution.dq
         self._min_singular_value = min(self._min_singular_value, solution.min_singular_value)
         self._near += dt * (solution.min_singular_value < self._config.singularity_warning)
-        self._path_length += float(np.linalg.norm(position - self._position))
+        self._path_length += norm(position - self._position)
         self._position = np.array(position)
-        self._max_tracking = max(self._max_tracking, float(np.linalg.norm(position - desired)))
+        self._max_tracking = max(self._max_tracking, norm(position - desired))
         self._velocities.append(np.array(velocity))
         if len(self._velocities) == 3:
             a, b, d = self._velocities

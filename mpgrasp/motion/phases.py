@@ -43,7 +43,7 @@ def descend(state: ExecutionState) -> None:
         target = state.pose(tip + hand.FINGERTIP_BEYOND_TCP)
         if target[2, 3] >= driver.T_desired[2, 3]:
             continue
-        reached = state.move(target, speed, until=lambda: driver.touch > c.contact_threshold)
+        reached = state.move(target, speed, until=lambda: state.felt() > c.contact_threshold)
         if not reached and driver.reflex is None:
             _back_off(state)
             break

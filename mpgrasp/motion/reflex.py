@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector
+from mpgrasp.linear_algebra import norm, product
 from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.robot import limits
 
@@ -207,12 +208,12 @@ class ReflexMonitor:
     def _cartesian(self, arm: MeasuredArm, T_desired: FloatArray) -> Reflex | None:
         c, T = self.config, arm.T_world_tcp
         for limit, value, bound in (
-            ("cartesian_velocity", np.linalg.norm(arm.twist[:3]), c.cartesian_velocity),
-            ("cartesian_rotation", np.linalg.norm(arm.twist[3:]), c.cartesian_rotation),
-            ("tracking_position", np.linalg.norm(T_desired[:3, 3] - T[:3, 3]), c.tracking_position),
+            ("cartesian_velocity", norm(arm.twist[:3]), c.cartesian_velocity),
+            ("cartesian_rotation", norm(arm.twist[3:]), c.cartesian_rotation),
+            ("tracking_position", norm(T_desired[:3, 3] - T[:3, 3]), c.tracking_position),
             (
                 "tracking_orientation",
-                np.linalg.norm(rotation_vector(T[:3, :3].T @ T_desired[:3, :3])),
+                norm(rotation_vector(product(T[:3, :3].T, T_desired[:3, :3]))),
                 c.tracking_orientation,
             ),
         ):

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import least_squares, norm
 from mpgrasp.motion.ik import DifferentialIK
 from mpgrasp.motion.trajectory import MotionConfig, integrate_pose, path_profile, pose_error
 from mpgrasp.robot import panda
@@ -42,7 +43,7 @@ def scaled_profile(
         speed: bound [m/s].
         rotation: bound [rad/s].
     """
-    length, angle = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+    length, angle = norm(error[:3]), norm(error[3:])
     shares = path_profile(length, angle, config, speed, rotation)
     factor = slowdown(ik, q, T_start, error, shares, config)
     return shares if factor == 1 else path_profile(length, angle, config, speed, rotation, factor)
@@ -84,6 +85,6 @@ def rehearse(
     q, path = np.array(q, float), np.empty((len(shares), 7))
     for k, share in enumerate(shares):
         step = pose_error(ik.pose(q), integrate_pose(T_start, error, float(share)))
-        q = q + np.linalg.lstsq(ik.jacobian(q), step, rcond=1e-6)[0]
+        q = q + least_squares(ik.jacobian(q), step, 1e-6)
         path[k] = q
     return path

@@ -9,6 +9,7 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector, transform
+from mpgrasp.linear_algebra import norm, product
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +83,7 @@ class TwistRamp:
         c = self.config
         step = np.asarray(wanted, float) - self._limited
         for part, bound in ((slice(0, 3), c.linear_acceleration), (slice(3, 6), c.angular_acceleration)):
-            length = float(np.linalg.norm(step[part]))
+            length = norm(step[part])
             if length > bound * c.dt:
                 step[part] *= bound * c.dt / length
         self._limited = self._limited + step
@@ -115,7 +116,9 @@ def path_profile(
     duration = 1.0 / v + v / a
     t = np.arange(config.dt, duration + config.dt, config.dt)
     ramp = np.clip(np.minimum(a * t, a * (duration - t)), 0.0, v)
-    velocity = np.convolve(ramp, np.full(config.smoothing, 1.0 / config.smoothing))
+    velocity = np.zeros(len(ramp) + config.smoothing - 1)
+    for delay in range(config.smoothing):  # np.convolve would ask BLAS
+        velocity[delay : delay + len(ramp)] += ramp / config.smoothing
     share = np.cumsum(velocity)
     if share[-1] <= 0:
         return np.ones(1)  # a move so short that it fits into one tick
@@ -129,15 +132,15 @@ def shake_offset(t: float, amplitude: float, frequency: float, duration: float) 
 
 def pose_error(T_from: FloatArray, T_to: FloatArray) -> FloatArray:
     """Twist (6,), world axes, that carries one pose into the other within one second [m, rad]."""
-    rotation = rotation_vector(T_to[:3, :3] @ T_from[:3, :3].T)
+    rotation = rotation_vector(product(T_to[:3, :3], T_from[:3, :3].T))
     return np.concatenate([T_to[:3, 3] - T_from[:3, 3], rotation])
 
 
 def integrate_pose(T: FloatArray, twist: FloatArray, dt: float) -> FloatArray:
     """Pose (4, 4) after moving with `twist` (6,), world axes [m/s, rad/s], for dt [s]."""
     w = twist[3:] * dt
-    angle = float(np.linalg.norm(w))
+    angle = norm(w)
     K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
     a, b = (np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
-    R = np.eye(3) + a * K + b * (K @ K)
-    return transform(R @ T[:3, :3], T[:3, 3] + twist[:3] * dt)
+    R = np.eye(3) + a * K + b * product(K, K)
+    return transform(product(R, T[:3, :3]), T[:3, 3] + twist[:3] * dt)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import dot, norm
 from mpgrasp.robot import hand, panda
 
 _NONE = -1
@@ -41,7 +42,7 @@ class FingerContacts:
         fingers = [model.body(f"{panda.PREFIX}{side}_finger").id for side in _SIDES]
         self._object_of = _owners(model, bodies)[model.geom_bodyid]
         self._finger_of = _owners(model, fingers)[model.geom_bodyid]
-        weight = model.body_subtreemass[bodies] * np.linalg.norm(model.opt.gravity)
+        weight = model.body_subtreemass[bodies] * norm(model.opt.gravity)
         # A body of weight W that lies on both diagonals, 30 degrees from upright, is pressed with W cos 30
         # from either side, less than W. The cap lies above the weight of all that the arm can carry, 3 kg.
         self._needed = np.clip(weight, LEAST_FORCE, hand.GRIPPER_FORCE_MIN)
@@ -59,7 +60,7 @@ class FingerContacts:
         owner = self._object_of[geom].max(axis=1, initial=_NONE)
         closing = self._data.site_xmat[self._tcp].reshape(3, 3)[:, 1]  # towards the left finger
         for i in np.flatnonzero((finger >= 0) & (owner >= 0)).tolist():
-            along = float(contact.frame[i, :3] @ closing)
+            along = dot(contact.frame[i, :3], closing)
             if abs(along) <= FACE_COSINE or (force := self._normal_force(i)) <= 0:
                 continue
             # the normal points from the first geom to the second, which is pushed along it

@@ -52,27 +52,58 @@ class Cloth:
         return float(self.elevation[i : k + 1, j : m + 1].max())
 
 
-def make_cloth(unevenness: float, wavelength: float, rng: np.random.Generator) -> Cloth:
+def make_cloth(
+    unevenness: float, wavelength: float, rng: np.random.Generator, wrinkles: FloatArray | None = None
+) -> Cloth:
     """A Gaussian random surface.
 
     Args:
         unevenness: root mean square of the height about its mean, away from the hem [m]; 0 = flat.
         wavelength: mean distance between crests along a straight line [m].
         rng: drawn from the same number of times whatever the other arguments are.
+        wrinkles: (n, n) heights on top of the waves [m], if there are any.
     """
     n = round(2 * HALF_EXTENT / GRID) + 1
     noise = rng.standard_normal((n, n))
-    if unevenness == 0:
+    if unevenness == 0 and wrinkles is None:
         return Cloth(np.zeros((n, n)))
     # Rice: a line through noise filtered by a Gaussian of sigma s has one crossing up per 2 pi sqrt(2) s
     surface = gaussian_filter(noise, wavelength / (2 * np.pi * np.sqrt(2)) / GRID, mode="wrap")
     hem = round(HEM / GRID)
     inner = surface[hem:-hem, hem:-hem]
     surface = (surface - inner.mean()) * (unevenness / inner.std())
+    if wrinkles is not None:
+        surface = surface + wrinkles
     edge = np.minimum(np.arange(n), np.arange(n)[::-1]) / hem
     ramp = np.clip(edge, 0, 1)
     surface = (surface - surface.min()) * np.minimum.outer(ramp, ramp)
     return Cloth(surface)
+
+
+def make_wrinkles(height: float, width: float, count: int, rng: np.random.Generator) -> FloatArray:
+    """Heights (n, n) [m] of wrinkles at the cloth's points: straight ridges that fade towards their ends.
+
+    Across, a ridge is a Gaussian; along, it keeps its height over the middle half of its length, which is
+    drawn from 0.2 to 0.5 m, as its place and its direction are. Where ridges cross, the higher one counts.
+
+    Args:
+        height: of a crest [m].
+        width: of a ridge at half of its height [m].
+        count: number of ridges.
+        rng: source of places, directions and lengths.
+    """
+    axis = np.arange(round(2 * HALF_EXTENT / GRID) + 1) * GRID - HALF_EXTENT
+    x, y = np.meshgrid(axis, axis)
+    surface = np.zeros_like(x)
+    inner = HALF_EXTENT - HEM
+    for _ in range(count):
+        place, angle, length = rng.uniform(-inner, inner, 2), rng.uniform(0, np.pi), rng.uniform(0.2, 0.5)
+        along = (x - place[0]) * np.cos(angle) + (y - place[1]) * np.sin(angle)
+        across = (y - place[1]) * np.cos(angle) - (x - place[0]) * np.sin(angle)
+        fade = np.clip(2 - 4 * np.abs(along) / length, 0, 1)
+        ridge = height * np.exp2(-((2 * across / width) ** 2)) * fade * fade * (3 - 2 * fade)
+        np.maximum(surface, ridge, out=surface)
+    return np.asarray(surface)
 
 
 def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:

@@ -37,6 +37,16 @@ class SceneConfig:
     """Root mean square of the cloth's height about its mean [m]; 0 = flat."""
     cloth_wavelength: float = 0.06
     """Mean distance between the cloth's crests along a straight line [m]."""
+    cloth_wrinkles: float = 0.0
+    """Height of the cloth's wrinkles over its waves: long, narrow ridges [m]; 0 = none."""
+    cloth_wrinkle_width: float = 0.03
+    """Width of a wrinkle at half of its height [m]."""
+    cloth_wrinkle_count: int = 8
+    """Number of wrinkles on the cloth."""
+    no_return: float = 0.0
+    """Part of the objects' surfaces that the depth camera gets no return from, in patches [0, 1]."""
+    no_return_size: float = 0.01
+    """Length over which such a patch goes on [m]."""
     camouflage: bool = False
     """Give all objects the colour of the cloth."""
     basket: bool = False
@@ -58,6 +68,12 @@ class SceneConfig:
         _within("half extent of the placing region [m]", self.half_extent, 0.0, 0.4)
         _within("unevenness of the cloth [m]", self.cloth_unevenness, 0.0, 0.01)
         _within("wavelength of the cloth [m]", self.cloth_wavelength, 0.04, 1.0)
+        _within("height of the cloth's wrinkles [m]", self.cloth_wrinkles, 0.0, 0.02)
+        # narrower ones fall between the points of the cloth
+        _within("width of the cloth's wrinkles [m]", self.cloth_wrinkle_width, 0.02, 0.2)
+        _within("count of the cloth's wrinkles", self.cloth_wrinkle_count, 1, 100)
+        _within("part of the surfaces without return", self.no_return, 0.0, 1.0)
+        _within("length of patches without return [m]", self.no_return_size, 0.001, 0.2)
 
     def _check_pattern(self) -> None:
         if self.placing != "stack":

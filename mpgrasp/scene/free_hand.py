@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.linear_algebra import norm
 from mpgrasp.robot import hand, panda
 from mpgrasp.scene.moving_scene import MovingScene
 from mpgrasp.scene.objects.model import OBJECT_GROUP
@@ -162,7 +163,7 @@ class FreeHand(MovingScene):
     @property
     def lag(self) -> float:
         """Distance from where the tool point should be to where it is [m]."""
-        return float(np.linalg.norm(self._qpos[:3] - self._target[:3]))
+        return norm(self._qpos[:3] - self._target[:3])
 
     def _highest(self) -> float:
         model, data = self.model, self.data

@@ -11,10 +11,11 @@ import numpy as np
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.height_map import HeightMap
+from mpgrasp.linear_algebra import product
 from mpgrasp.paths import SCENES
 from mpgrasp.robot.panda import PREFIX, panda_spec, set_home
 from mpgrasp.scene.cloth import RGBA as CLOTH_RGBA
-from mpgrasp.scene.cloth import Cloth, add_cloth, make_cloth
+from mpgrasp.scene.cloth import Cloth, add_cloth, make_cloth, make_wrinkles
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.catalogue import load_object
 from mpgrasp.scene.objects.free_body import add_object
@@ -25,6 +26,7 @@ from mpgrasp.workspace import WORKSPACE_CENTRE
 SLEEP_TOLERANCE = 1e-3
 """Speed below which what touches no robot falls asleep after ten steps [m/s; rotations count by an object's
 size]; whatever moves and touches it wakes it, with all that it touches."""
+_WRINKLE_STREAM = 14  # of the seed, beside those of scene and episode
 _SKY = 2.0  # [m], height from which the rays of a height map are cast
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 """Parts of MuJoCo's state that `Scene.state` holds."""
@@ -92,8 +94,8 @@ class Scene:
         shadow = np.zeros((len(y), len(x)), bool)
         for geom in np.flatnonzero(self.model.geom_group == OBJECT_GROUP):
             R = data.geom_xmat[geom].reshape(3, 3)
-            centre = data.geom_xpos[geom] + R @ self.model.geom_aabb[geom, :3]
-            reach = np.abs(R) @ self.model.geom_aabb[geom, 3:]
+            centre = data.geom_xpos[geom] + product(R, self.model.geom_aabb[geom, :3])
+            reach = product(np.abs(R), self.model.geom_aabb[geom, 3:])
             shadow[np.ix_(np.abs(y - centre[1]) <= reach[1], np.abs(x - centre[0]) <= reach[0])] = True
         return shadow
 
@@ -113,7 +115,7 @@ def build_scene(config: SceneConfig, seed: int, *, robot: bool = True) -> Scene:
     draw, weave, drop = (np.random.default_rng([seed, stream]) for stream in range(3))
     models = _draw_objects(config, draw)
     names = _unique_names(models)
-    cloth = make_cloth(config.cloth_unevenness, config.cloth_wavelength, weave)
+    cloth = make_cloth(config.cloth_unevenness, config.cloth_wavelength, weave, _draw_wrinkles(config, seed))
 
     spec = _arena(config, cloth)
     for name, model in zip(names, models, strict=True):
@@ -157,6 +159,14 @@ def _arena(config: SceneConfig, cloth: Cloth) -> mujoco.MjSpec:
         basket = mujoco.MjSpec.from_file(str(SCENES / "basket.xml"))
         spec.attach(basket, prefix="basket/", frame=spec.worldbody.add_frame())
     return spec
+
+
+def _draw_wrinkles(config: SceneConfig, seed: int) -> FloatArray | None:
+    """Return the heights (n, n) of the cloth's wrinkles [m]; None without any."""
+    if config.cloth_wrinkles == 0:
+        return None
+    rng = np.random.default_rng([seed, _WRINKLE_STREAM])
+    return make_wrinkles(config.cloth_wrinkles, config.cloth_wrinkle_width, config.cloth_wrinkle_count, rng)
 
 
 def _draw_objects(config: SceneConfig, rng: np.random.Generator) -> tuple[ObjectModel, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_from_quaternion
+from mpgrasp.linear_algebra import norm, product
 from mpgrasp.scene.cloth import Cloth
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import ObjectModel
@@ -144,13 +145,13 @@ class Settler:
         self._put(k, spot, self._orientation())
 
     def _put(self, k: int, spot: FloatArray, quaternion: FloatArray) -> None:
-        points = self.objects[k].points @ rotation_from_quaternion(quaternion).T
+        points = product(self.objects[k].points, rotation_from_quaternion(quaternion).T)
         radius = float(np.linalg.norm(points[:, :2], axis=1).max())
         ground = self.cloth.highest(float(spot[0]), float(spot[1]), radius)
         for j in map(int, np.flatnonzero(self._dropped)):
             pose = self._pose(j)
-            if np.linalg.norm(pose[:2] - spot) < radius + self._radius[j]:
-                top = (self.objects[j].points @ rotation_from_quaternion(pose[3:]).T)[:, 2].max()
+            if norm(pose[:2] - spot) < radius + self._radius[j]:
+                top = product(self.objects[j].points, rotation_from_quaternion(pose[3:]).T)[:, 2].max()
                 ground = max(ground, float(pose[2] + top))
         height = ground - float(points[:, 2].min()) + _DROP_GAP
         a, v = self._qpos[k], self._dof[k]
@@ -164,7 +165,7 @@ class Settler:
         yaw = self.rng.uniform(-np.pi, np.pi)
         turn = self.rng.standard_normal(4)
         if self.config.pose == "random":
-            return turn / np.linalg.norm(turn)
+            return turn / norm(turn)
         return np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
 
     def _pile_spot(self) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
+from mpgrasp.linear_algebra import least_squares
 from mpgrasp.robot import hand, panda
 from mpgrasp.scene.moving_scene import MovingScene
 from mpgrasp.scene.scene import STATE, Scene
@@ -127,7 +128,7 @@ class Simulation(MovingScene):
             return np.zeros(3)
         J = np.empty((6, self.model.nv))
         mujoco.mj_jacSite(self.model, self.data, J[:3], J[3:], self._tcp)
-        wrench, *_ = np.linalg.lstsq(J[:, self._dofs].T, self._contact_torque, rcond=1e-3)
+        wrench = least_squares(J[:, self._dofs].T, self._contact_torque, 1e-3)
         return wrench[:3]
 
     def state_hash(self) -> str:

@@ -19,7 +19,18 @@ _GROUPS: Mapping[str, tuple[Idle, ...]] = {
     "scene": (
         Idle(("jitter", "pattern"), lambda c: c.placing != "stack", "placing is not stack"),
         Idle(("cloth_wavelength",), lambda c: c.cloth_unevenness == 0, "cloth_unevenness is 0"),
+        Idle(
+            ("cloth_wrinkle_width", "cloth_wrinkle_count"),
+            lambda c: c.cloth_wrinkles == 0,
+            "cloth_wrinkles is 0",
+        ),
+        Idle(("no_return_size",), lambda c: c.no_return == 0, "no_return is 0"),
     ),
+    "sensor": (
+        Idle(("pattern_px", "pattern_time"), lambda c: c.fixed_pattern == 0, "fixed_pattern is 0"),
+        Idle(("correlation_px",), lambda c: c.subpixel == 0, "subpixel is 0"),
+    ),
+    "episode": (Idle(("start_jitter",), lambda c: c.start_radius is not None, "there is a start_radius"),),
     "controller": (
         Idle(("peak_threshold",), lambda c: c.alpha == 1, "alpha is 1"),
         Idle(("z_max",), lambda c: c.cost_heights is not None, "there are cost_heights"),

@@ -6,10 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
+from mpgrasp.camera.config import CameraConfig
 from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.episode.config import EpisodeConfig
-from mpgrasp.episode.world import World
+from mpgrasp.episode.world import World, _start_offset
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.scene.config import SceneConfig
 
@@ -40,3 +42,36 @@ def test_the_configs_told_are_those_in_use(noise: bool) -> None:
     assert told["reflex"] is world.driver.monitor.config
     assert told["ik"] is world.driver.ik.config
     world.close()
+
+
+def test_a_start_in_a_disc_is_uniform_in_it() -> None:
+    places = []
+    for seed in range(40):
+        config = EpisodeConfig(camera_backend="ray", start_radius=0.12)
+        offset = _start_offset(config, np.random.default_rng(seed))
+        places.append(offset)
+    radii = np.linalg.norm(places, axis=1)
+    assert radii.max() <= 0.12
+    # of a uniform disc, the square of the radius is uniform
+    assert kstest((radii / 0.12) ** 2, "uniform").pvalue > 0.01
+    assert EpisodeConfig().start_radius is None
+    with pytest.raises(ConfigError, match="start_radius"):
+        EpisodeConfig(start_radius=-0.1)
+
+
+def test_errors_of_the_camera_are_drawn_from_the_seed_and_each_by_itself() -> None:
+    camera = CameraConfig(calibration_translation=0.01)
+    plain = EpisodeConfig(camera_backend="ray", camera=camera)
+    noisy = dataclasses.replace(plain, sensor=DepthNoise(fixed_pattern=0.05))
+    dark = dataclasses.replace(SCENE, no_return=0.5)
+    worlds = [World(SCENE, 5, plain), World(SCENE, 5, noisy), World(dark, 5, noisy), World(SCENE, 6, plain)]
+    first, *others = (world.camera.errors.calibration for world in worlds)
+    assert first is not None
+    same = [other is not None and np.array_equal(first, other) for other in others]
+    assert same == [True, True, False]
+    assert worlds[0].camera.errors.pattern is None
+    assert worlds[1].camera.errors.pattern is not None
+    assert worlds[1].camera.errors.patches is None
+    assert worlds[2].camera.errors.patches is not None
+    for world in worlds:
+        world.close()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import chi
 
 from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import Grasp
@@ -112,3 +113,56 @@ def test_a_descent_that_feels_something_backs_off_a_little() -> None:
     assert state.contact_height == pytest.approx(0.03)
     assert state.tip_height == pytest.approx(0.03 + c.back_off)
     assert len(driver.moves) == 3
+
+
+class ShakyDriver(PlainDriver):
+    """Goes down in ticks of a hundredth of a second and feels nothing but its noise."""
+
+    def move_to(
+        self,
+        T_world_tcp: FloatArray,
+        max_speed: float,
+        *,
+        until: Callable[[], bool] | None = None,
+        deceleration: float | None = None,
+        on_tick: Callable[[Any], None] | None = None,
+    ) -> bool:
+        way = self.T_desired[2, 3] - T_world_tcp[2, 3]
+        self.T_desired = self.simulation.T_world_tcp = T_world_tcp.copy()
+        ticks = round(abs(way) / max_speed / 0.01)
+        self.moves += [(float(T_world_tcp[2, 3]), max_speed)] * ticks
+        return until is None or not any(until() for _ in range(ticks))
+
+
+def test_a_false_contact_is_as_likely_as_the_tail_of_the_noise_says() -> None:
+    """Noise of s on three axes has a length beyond r with the probability of a chi distribution's tail."""
+    config = ExecutionConfig(force_noise=1.0, contact_threshold=3.5)
+    false, n, samples = 0, 400, 0
+    for seed in range(n):
+        driver = ShakyDriver(z=0.12)
+        state = ExecutionState(driver, GRASP, config, yaw=0.0, rng=np.random.default_rng(seed))
+        descend(state)
+        false += state.contact_height is not None
+        samples = max(samples, len(driver.moves))
+    expected = 1 - (1 - chi(3).sf(3.5)) ** samples
+    assert 0.1 < expected < 0.9
+    assert false / n == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / n))
+
+
+def test_without_noise_the_force_is_felt_as_it_is_and_nothing_is_drawn() -> None:
+    rng = np.random.default_rng(0)
+    driver = PlainDriver()
+    state = state_by(driver, rng=rng)
+    driver.touch = 1.25
+    assert state.felt() == 1.25
+    assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
+
+
+def test_a_force_is_felt_as_the_length_of_its_sum_with_the_noise() -> None:
+    driver = PlainDriver()
+    config = ExecutionConfig(force_noise=0.5)
+    state = ExecutionState(driver, GRASP, config, yaw=0.0, rng=np.random.default_rng(2))
+    driver.touch = 3.0
+    squares = np.square([state.felt() for _ in range(4000)])
+    # |f + n|^2 = f^2 + 3 s^2 on average
+    assert squares.mean() == pytest.approx(9.0 + 3 * 0.25, rel=0.03)

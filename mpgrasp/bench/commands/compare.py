@@ -182,9 +182,11 @@ def main(command: Sequence[str]) -> int:
     (folder_a, a), (folder_b, b) = read_cells(arguments.a), read_cells(arguments.b)
     rows = compare(a, b)
     print(f"A = {folder_a}\nB = {folder_b}")
-    before, after = (read_run(folder).configuration for folder in (folder_a, folder_b))
-    for changed in unequal_conditions(before, after):
+    before, after = (read_run(folder) for folder in (folder_a, folder_b))
+    for changed in unequal_conditions(before.configuration, after.configuration):
         print(f"Not the same in both: {changed.words('in A', 'in B')}")
+    for changed in differences(before.made_with.as_row(), after.made_with.as_row()):
+        print(f"Not made with the same: {changed.words('in A', 'in B')}")
     for side, cells, shown in (("A", a, {row.a for row in rows}), ("B", b, {row.b for row in rows})):
         alone = [str(cell) for cell in cells if cell not in shown]
         if alone:

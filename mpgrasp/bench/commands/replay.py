@@ -14,7 +14,7 @@ from msgspec.structs import replace as replace_fields
 from mpgrasp.bench.record import Cell, ErrorLine, Line, PlayedLine, Task
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.files.json_values import difference
+from mpgrasp.files.json_values import difference, differences
 
 if TYPE_CHECKING:
     from mpgrasp.bench.playing.plan import Plan
@@ -82,9 +82,8 @@ def main(command: Sequence[str]) -> int:
     changed = _difference_of_configurations(run.configuration, configuration(plan, player), task)
     if changed:
         print(f"The configuration is another one: {changed}")
-    made_with = difference(run.made_with.as_row(), provenance().as_row())
-    if made_with:
-        print(f"Not made with the same: {made_with.words('then', 'now')}")
+    for place in differences(run.made_with.as_row(), provenance().as_row()):
+        print(f"Not made with the same: {place.words('then', 'now')}")
     line = player.play(task)
     if plan.record:
         print(f"Recorded: {plan.recordings}/{task.stem}.*")

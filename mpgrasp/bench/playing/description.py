@@ -13,6 +13,7 @@ from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import Player
 from mpgrasp.bench.playing.recorded_command import PROGRAM
 from mpgrasp.bench.record import record_of
+from mpgrasp.bench.results.plug_in_source import source_hash
 from mpgrasp.bench.results.run_card import (
     Card,
     Configuration,
@@ -73,7 +74,11 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         cells=tuple(str(method) for method in plan.methods),
         detectors=tuple(_detector_card(plan, name, item) for name, item in player.detectors.items()),
         controllers=tuple(
-            ControllerCard(name=name, config=json_value(getattr(controller, "config", None)))
+            ControllerCard(
+                name=name,
+                config=json_value(getattr(controller, "config", None)),
+                source=source_hash("controller", name),
+            )
             for name, controller in player.controllers.items()
         ),
         until_ci=plan.until_ci,
@@ -110,6 +115,7 @@ def _detector_card(plan: Plan, name: str, detector: GraspDetector) -> DetectorCa
         device=json_value(getattr(detector, "device", None)),
         runtime=json_value(getattr(detector, "runtime", None)),
         config=json_value(getattr(detector, "config", None)),
+        source=source_hash("detector", name),
     )
 
 

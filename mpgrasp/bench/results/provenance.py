@@ -12,6 +12,7 @@ from pathlib import Path
 
 import mpgrasp
 from mpgrasp.bench.record import Record
+from mpgrasp.bench.results.processor import blas_kernels, instruction_sets, processor
 from mpgrasp.paths import DATA_ROOT
 
 PACKAGES = (
@@ -42,7 +43,7 @@ class GitState(Record, frozen=True, kw_only=True):
     """True if files under version control differ from the commit."""
 
 
-class MadeWith(Record, frozen=True, kw_only=True):
+class MadeWith(Record, frozen=True, kw_only=True, omit_defaults=True):
     """Versions and machine that results were made with."""
 
     mpgrasp: str
@@ -51,6 +52,12 @@ class MadeWith(Record, frozen=True, kw_only=True):
     python: str
     platform: str
     machine: str
+    processor: str = ""
+    """Name of the processor; empty where the system does not tell it, and in runs from before it was kept."""
+    instruction_sets: tuple[str, ...] = ()
+    """Groups of instructions that numpy uses, as it names them."""
+    blas: tuple[str, ...] = ()
+    """numpy's BLAS: name, version and kernel."""
     packages: dict[str, str]
     """Versions of those of `PACKAGES` that are installed."""
     threads: dict[str, int | str]
@@ -65,6 +72,9 @@ def provenance() -> MadeWith:
         python=platform.python_version(),
         platform=platform.system(),
         machine=platform.machine(),
+        processor=processor(),
+        instruction_sets=tuple(instruction_sets()),
+        blas=tuple(blas_kernels()),
         packages={name: version for name in PACKAGES if (version := _version(name))},
         threads=threads(),
     )

@@ -48,7 +48,7 @@ class SuitePart(Record, frozen=True, kw_only=True, omit_defaults=True):
     """Episodes of each cell, with `until_ci` those that are added at a time."""
 
 
-class DetectorCard(Record, frozen=True, kw_only=True):
+class DetectorCard(Record, frozen=True, kw_only=True, omit_defaults=True):
     """A detector of a run."""
 
     name: str
@@ -60,13 +60,17 @@ class DetectorCard(Record, frozen=True, kw_only=True):
     device: str | None
     runtime: str | None
     config: Any
+    source: str | None = None
+    """Hash of a plug-in's source; None for a detector of the registry."""
 
 
-class ControllerCard(Record, frozen=True, kw_only=True):
+class ControllerCard(Record, frozen=True, kw_only=True, omit_defaults=True):
     """A controller of a run."""
 
     name: str
     config: Any
+    source: str | None = None
+    """Hash of a plug-in's source; None for a controller of the registry."""
 
 
 class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):

@@ -22,7 +22,7 @@ from mpgrasp.bench.results.reader import EPISODES, RUN, SUMMARY, read_complete, 
 from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescription
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
-from mpgrasp.files.json_values import difference
+from mpgrasp.files.json_values import differences
 
 
 class RunDirectory:
@@ -87,9 +87,10 @@ class RunDirectory:
                 got=str(path),
                 allowed="the configuration that the run began with, or another directory",
             )
-        changed = difference(before.made_with.as_row(), run.made_with.as_row())
+        changed = list(differences(before.made_with.as_row(), run.made_with.as_row()))
         if changed:
-            note(f"not made with the same as the finished episodes ({changed.words('there', 'here')})")
+            words = "; ".join(place.words("there", "here") for place in changed)
+            note(f"not made with the same as the finished episodes ({words})")
         resumption = Resumption(started=run.started, made_with=run.made_with if changed else None)
         with new._taking_over():
             new._claim()

@@ -22,6 +22,7 @@ from mpgrasp.detectors.antipodal.hand import HandGeometry
 from mpgrasp.detectors.antipodal.turned_map import TurnedMap, odd
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.height_map import HeightMap
+from mpgrasp.linear_algebra import product
 
 Float32 = NDArray[np.float32]
 
@@ -121,8 +122,8 @@ def _at_angle(
     h, w = label.shape
     c, s = np.cos(theta), np.sin(theta)
     R = np.array([[c, -s], [s, c]])  # turned (col, row) offsets -> the map's
-    size = np.ceil(np.abs(R).T @ (w, h)).astype(int) + 1
-    offset = np.array([w - 1, h - 1]) / 2 - R @ (size - 1) / 2
+    size = np.ceil(product(np.abs(R).T, np.array([w, h], float))).astype(int) + 1
+    offset = np.array([w - 1, h - 1]) / 2 - product(R, (size - 1.0) / 2)
     turned = cv2.warpAffine(
         np.dstack([height, label]),
         np.column_stack([R, offset]),
@@ -132,7 +133,7 @@ def _at_angle(
     turned_map = TurnedMap(
         turned[..., 0].astype(np.float32),
         turned[..., 1].astype(np.float32),
-        (masses[:, ::-1] - offset) @ R,
+        product(masses[:, ::-1] - offset, R),
         cell,
         hand,
     )
@@ -147,5 +148,5 @@ def _at_angle(
     result[..., :1] = np.where(q > 0, cv2.blur(q, (1, along), borderType=cv2.BORDER_CONSTANT)[..., None], 0)
     weighted = cv2.blur(np.dstack([q, q * result[..., 1:]]), (3, along), borderType=cv2.BORDER_CONSTANT)
     result[..., 1:] = weighted[..., 1:] / np.maximum(weighted[..., :1], 1e-6)
-    back = np.column_stack([R.T, -R.T @ offset])
+    back = np.column_stack([R.T, -product(R.T, offset)])
     return np.asarray(cv2.warpAffine(result, back, (w, h), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP))

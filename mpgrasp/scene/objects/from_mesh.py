@@ -23,6 +23,7 @@ import numpy as np
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.files.cache import load_result, store_result
 from mpgrasp.geometry import FloatArray
+from mpgrasp.linear_algebra import product
 from mpgrasp.scene.objects.model import MAX_SIZE, ObjectModel, Part
 from mpgrasp.scene.objects.surface import (
     MAX_PATCH,
@@ -204,4 +205,4 @@ def _thinned(vertices: FloatArray) -> FloatArray:
     z, turn = 1 - (2 * k + 1) / MAX_VERTICES, k * np.pi * (3 - np.sqrt(5))  # a Fibonacci spiral
     around = np.sqrt(1 - z**2)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
     directions = np.vstack([np.eye(3), -np.eye(3), np.column_stack([around, z])])
-    return np.asarray(corners[np.unique(np.argmax(corners @ directions.T, axis=0))])
+    return np.asarray(corners[np.unique(np.argmax(product(corners, directions.T), axis=0))])

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from mpgrasp.exceptions import AssetError
-from mpgrasp.geometry import FloatArray, rotation_from_quaternion, transform
+from mpgrasp.geometry import FloatArray, rotation_from_quaternion, transform, transform_points
 
 OBJECT_GROUP = 1
 """Geom group of all objects: height maps cast their rays at this group alone."""
@@ -70,7 +70,7 @@ class Part:
     def points(self) -> FloatArray:
         """(n, 3) [m] points of the part's surface in the object's frame; their hull fills it to about 2 %."""
         T = self.T_object_part
-        return self._local_points() @ T[:3, :3].T + T[:3, 3]
+        return transform_points(T, self._local_points())
 
     @cached_property
     def volume(self) -> float:

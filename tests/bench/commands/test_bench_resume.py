@@ -110,6 +110,16 @@ def test_another_configuration_is_refused_by_name_and_nothing_changes(
     assert {file: file.read_bytes() for file in part.glob("*.json*")} == before
 
 
+def test_a_plug_in_whose_source_has_changed_is_refused(
+    part: Path, fake_world: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fake_world.setattr("mpgrasp.bench.playing.description.source_hash", lambda kind, path: f"new {path}")
+    before = (part / "episodes.jsonl").read_bytes()
+    assert main(["--resume", str(part)]) == 2
+    assert "source: " in capsys.readouterr().err
+    assert (part / "episodes.jsonl").read_bytes() == before
+
+
 def test_another_version_is_noted_and_written_down(
     part: Path, fake_world: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,7 +19,7 @@ from mpgrasp.bench.results.provenance import PACKAGES, provenance
 
 INCONSEQUENTIAL = {
     "gymnasium", "imageio", "jinja2", "lazy-loader", "matplotlib", "msgspec", "pillow", "platformdirs",
-    "rerun-sdk", "rich", "safetensors",
+    "rerun-sdk", "rich", "safetensors", "threadpoolctl",
 }  # fmt: skip
 """Dependencies that draw, store or wrap, and compute nothing of an episode."""
 
