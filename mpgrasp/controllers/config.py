@@ -68,7 +68,7 @@ class ReachConfig:
     home_yaw: float = 0.0
     """Heading of the tcp's x axis in the arm's home posture [rad]."""
     yaw_range: float = np.pi / 2
-    """The hand stays within this of the home heading, well within the range of joint 7 [rad]."""
+    """The hand stays within this of the home heading, moved on where joint 7 would meet its limit [rad]."""
     gripper_open: float = hand.GRIPPER_MAX_WIDTH
     """Opening of the gripper during the reach [m]."""
 

@@ -14,6 +14,7 @@ from mpgrasp.controllers.information import exploration_cost, grid_entropy, info
 from mpgrasp.geometry import FloatArray, wrap_half_pi, wrap_pi
 from mpgrasp.grasp import Grasp, GraspMap, best_pixel, peak_height
 from mpgrasp.linear_algebra import dot, norm
+from mpgrasp.robot.limits import Q_HOME, Q_MAX, Q_MIN
 
 _TIE = 1e-3
 """Utilities closer to the best than this fraction of the range in the window are equally good."""
@@ -21,6 +22,9 @@ _TIE_NAT = 1e-6
 """And so are utilities closer than this: single precision makes no better difference [nat]."""
 _YAW_SLACK = np.deg2rad(15)
 """Angle beyond the yaw range at which a grasp makes the hand turn the other way to meet it [rad]."""
+
+_WRIST_SPARE = 0.15
+"""Angle to the limits of joint 7 left to IK's margin and to the elbow, which turns the hand too [rad]."""
 
 
 class ReachingController:
@@ -147,11 +151,25 @@ class ReachingController:
         closing = np.arctan2(T_world_tcp[1, 1], T_world_tcp[0, 1])
         yaw = float(wrap_pi(np.arctan2(T_world_tcp[1, 0], T_world_tcp[0, 0]) - c.home_yaw))
         goal = yaw + float(wrap_half_pi(angle - closing))
-        if abs(goal) > c.yaw_range + _YAW_SLACK:
+        low, high = self._yaw_bounds(T_world_tcp)
+        if not low - _YAW_SLACK <= goal <= high + _YAW_SLACK:
             goal -= np.copysign(np.pi, goal)
         # within the slack the hand waits at the end of its range; the grasp itself turns the rest
-        goal = float(np.clip(goal, -c.yaw_range, c.yaw_range))
+        goal = float(np.clip(goal, low, high))
         return float(np.clip(c.yaw_gain * (goal - yaw), -c.yaw_rate_max, c.yaw_rate_max))
+
+    def _yaw_bounds(self, T_world_tcp: FloatArray) -> tuple[float, float]:
+        """Return the lowest and highest heading from home [rad]: the yaw range, moved on to spare joint 7.
+
+        The arm points to the tool, and joint 7 turns the hand back by as much: the farther aside, the less
+        is left for the hand's own turn.
+        """
+        range_ = self.config.yaw_range
+        bearing = float(np.arctan2(T_world_tcp[1, 3], T_world_tcp[0, 3]))
+        low = bearing - float(Q_MAX[6] - Q_HOME[6]) + _WRIST_SPARE
+        high = bearing - float(Q_MIN[6] - Q_HOME[6]) - _WRIST_SPARE
+        move = max(low + range_, 0.0) + min(high - range_, 0.0)
+        return -range_ + move, range_ + move
 
 
 def best_grasp_in_view(grasp_map: GraspMap, cells: NDArray[np.intp], grid: GridMap) -> Grasp | None:

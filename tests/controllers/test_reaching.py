@@ -12,6 +12,7 @@ from toy_views import Blob, fly
 from mpgrasp.controllers import make_controller
 from mpgrasp.controllers.config import MVP
 from mpgrasp.geometry import line_angle_difference
+from mpgrasp.robot.limits import Q_HOME, Q_MAX, Q_MIN
 
 
 @pytest.mark.parametrize("name", REACHING)
@@ -99,3 +100,21 @@ def test_the_hand_turns_the_shorter_way(name: str, yaw: float) -> None:
         twist = make_controller(name).update(observe((0.45, 0.0, 0.4), view, yaw)).twist
         # the grid knows angles to half a bin of ten degrees
         assert twist[5] == pytest.approx(np.clip(turn, -0.5, 0.5), abs=0.09)
+
+
+@pytest.mark.parametrize("name", REACHING)
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("angle", [-1.4, -0.3, 0.0, 0.3])
+def test_where_the_arm_points_aside_the_hand_turns_no_further_than_joint_7_can(
+    name: str, side: float, angle: float
+) -> None:
+    x, y, yaw = 0.4, 0.28 * side, 0.0
+    bearing = float(np.arctan2(y, x))
+    controller = make_controller(name)
+    for _ in range(45):  # turned by the controller's rate alone
+        twist = controller.update(observe((x, y, 0.4), replace(OBJECT, x=x, y=y, angle=angle), yaw)).twist
+        yaw += 0.1 * float(twist[5])
+    wrist = Q_HOME[6] + bearing - yaw  # the arm points to the tool, and the wrist turns the hand back
+    assert Q_MIN[6] + 0.1 < wrist < Q_MAX[6] - 0.1
+    # what the end of the range leaves for the grasp itself to turn is less than 15 degrees and half a bin
+    assert line_angle_difference(yaw - np.pi / 2, angle) < np.deg2rad(21)
