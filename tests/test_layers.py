@@ -19,7 +19,7 @@ PACKAGE = Path(mpgrasp.__file__).parent
 ORDER = (
     "exceptions", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics",
-    "depth", "height_map", "grasp",
+    "readings", "depth", "height_map", "grasp",
     "robot", "camera",
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
