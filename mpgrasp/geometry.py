@@ -16,13 +16,13 @@ from mpgrasp.exceptions import ConfigError
 FloatArray = NDArray[np.floating]
 
 MAX_SKEW = 1e-3
-"""Most that a rotation's columns may miss length 1 or a right angle by; calibrations are stored with few digits."""
+"""Most that a rotation misses length 1 or a right angle by; stored calibrations have few digits."""
 MAX_DISTANCE = 100.0
 """Farther from the world's origin no camera is that looks at a table [m]."""
 
 
 def check_pose(T: object, name: str) -> None:
-    """Raise ConfigError unless T is a rigid transform (4, 4): finite, orthonormal, right-handed, in metres."""
+    """Raise ConfigError unless T is a rigid transform (4, 4): finite, orthonormal, right-handed, near."""
     if not isinstance(T, np.ndarray) or T.shape != (4, 4) or not np.issubdtype(T.dtype, np.floating):
         got = f"{T.dtype} {T.shape}" if isinstance(T, np.ndarray) else type(T).__name__
         raise ConfigError(f"{name} is no pose", got=got, allowed="an array (4, 4) of floats")

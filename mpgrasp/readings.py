@@ -75,9 +75,8 @@ def metres(depth: object, unit: float, no_return: float | Iterable[float]) -> ND
         lost |= depth == mark
     result = (depth * np.float64(unit)).astype(np.float32)
     result[lost] = np.nan
-    beyond = result > MAX_DEPTH
-    if not beyond.sum() > (~lost).sum() / 2:
-        beyond &= np.isfinite(result)
+    beyond = (result > MAX_DEPTH) & np.isfinite(result)
+    if 2 * beyond.sum() < (~lost).sum():  # else it is the unit that is wrong
         result[beyond] = np.nan
     nearest, farthest = np.fmin.reduce(result, axis=None), np.fmax.reduce(result, axis=None)
     if nearest <= 0 or farthest > MAX_DEPTH or farthest < MIN_DEPTH:

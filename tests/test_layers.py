@@ -17,7 +17,7 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "geometry", "paths", "outcome", "workspace",
+    "exceptions", "forking", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",
