@@ -65,12 +65,12 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
     Info: `scene_seed`; `mppc_action` (4,), what MP-PC would do now, to imitate or to compare with; after the
     last step also `outcome`, `is_success`, `reflex` in words or "", and `result`, the `EpisodeResult`.
 
-    `reset()` draws an episode from `np_random`, which `reset(seed=...)` seeds, and never one of the benchmark.
+    `reset()` draws an episode from `np_random`, which `reset(seed=...)` seeds, never one of the benchmark.
     `reset(options={"episode": k})` sets up episode k of the suite as the benchmark plays it with seed 0,
     whatever happened before.
 
-    An environment belongs to the thread that resets it first; several, each in a thread of its own, may run at
-    once. `AsyncVectorEnv` may fork its processes unless this one has used OpenGL, OpenVINO or torch, which
+    An environment belongs to the thread that resets it first; several, each in a thread of its own, may run
+    at once. `AsyncVectorEnv` may fork its processes unless this one has used OpenGL, OpenVINO or torch, which
     hang in forks: then the first reset says so, and `context="spawn"` works always.
 
     Args:
@@ -135,7 +135,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         """Set up an episode: one drawn for training, or with the option `episode` that of the benchmark.
 
         Raises:
-            ConfigError: other options, a detector that cannot be used, the thread of another one's episode, or
+            ConfigError: other options, a detector that cannot be used, another thread's episode, or
                 a process that was forked after OpenGL, OpenVINO or torch had started.
             WeightsError: weights of the detector that cannot be used.
         """

@@ -75,7 +75,7 @@ class DHRNetConfig:
             raise ConfigError(
                 "unusable DHRNet settings",
                 got=self,
-                allowed=f"1 to {MAX_CHANNELS} channels, 1 to {MAX_REPEATS} blocks, three counts of modules alike",
+                allowed=f"1 to {MAX_CHANNELS} channels, 1 to {MAX_REPEATS} blocks, three counts of modules",
             )
         if self.head not in HEAD_BRANCHES:
             raise ConfigError("unknown head of a DHRNet", got=self.head, allowed=HEAD_BRANCHES)
