@@ -64,7 +64,7 @@ def read_description(path: Path | str) -> WeightsDescription:
             got=shown(metadata.get("format", "no format")),
             allowed=f"safetensors with format {FORMAT}",
         )
-    name = metadata.get("network")
+    name = metadata.get("network", "no name")
     if name not in NETWORKS:
         raise WeightsError(f"{path}: weights of an unknown network", got=shown(name), allowed=NETWORKS)
     settings, image, width_px, card = (
