@@ -37,7 +37,7 @@ class NetworkDeclaration:
 
     network: Callable[[Any], nn.Module]
     """Class of the network, which is made from its config."""
-    config: Callable[..., Any]
+    config: type[Any]
     """Config dataclass; its fields are the settings in a weights file. It has `channels`, and `size` if the
     network fits images of one size only."""
     source: str

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -146,12 +145,12 @@ def _without_range_channel(image: Any) -> Any:
 
 
 def _check_width(path: Path | str, width_px: object, size: int) -> None:
-    number = isinstance(width_px, int | float) and not isinstance(width_px, bool)
-    if not (number and 0 < width_px <= MAX_WIDTH_SHARE * size and math.isfinite(width_px)):  # type: ignore[operator]
+    most = MAX_WIDTH_SHARE * size
+    if isinstance(width_px, bool) or not isinstance(width_px, int | float) or not 0 < width_px <= most:
         raise WeightsError(
             f"{path}: weights with a wrong unit of width",
             got=shown(width_px),
-            allowed=f"above 0, up to {MAX_WIDTH_SHARE * size:g} px",
+            allowed=f"above 0, up to {most:g} px",
         )
 
 
