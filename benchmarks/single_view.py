@@ -85,11 +85,13 @@ def propose(
         scene, sample = dataset.scene(i), dataset.sample(i)
         if told and scene != before:
             before, truth = scene, make_scene(*scene)[0].height_map()
-        frame = DepthFrame(
-            depth=sample.depth,
+        frame = DepthFrame.from_camera(
+            sample.depth,
             rgb=sample.rgb,
             intrinsics=stored_intrinsics(),
             T_world_camera=stored_pose(dataset.meta[i], dataset.columns),
+            unit=1.0,
+            no_return=0.0,
         )
         for name, detector in detectors.items():
             detector.reset(truth if reads_truth(detector) else None)

@@ -11,14 +11,18 @@ Holes are filled as in the published GG-CNN code (https://github.com/dougsm/ggcn
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from numbers import Integral, Real
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, invert, transform_points
+from mpgrasp.geometry import FloatArray, check_pose, invert, transform_points
+from mpgrasp.readings import check_colour, check_depth, metres
 
 CROP = 350
 """Side of the central square of a 640 x 480 image that detectors see [px], as in published MVP code."""
@@ -46,9 +50,14 @@ class CameraIntrinsics:
     """Rows."""
 
     def __post_init__(self) -> None:
-        if self.width < 1 or self.height < 1 or min(self.fx, self.fy) <= 0:
+        size, numbers = (self.width, self.height), (self.fx, self.fy, self.cx, self.cy)
+        whole = all(isinstance(n, Integral) and n >= 1 for n in size)
+        real = all(isinstance(x, Real) and math.isfinite(x) for x in numbers)
+        if not (whole and real and min(self.fx, self.fy) > 0):
             raise ConfigError(
-                "unusable camera intrinsics", got=self, allowed="positive size and focal lengths"
+                "unusable camera intrinsics",
+                got=self,
+                allowed="a size in whole pixels from 1, focal lengths above 0, all of them finite",
             )
 
     def crop(self, row: float, col: float, height: int, width: int) -> CameraIntrinsics:
@@ -97,7 +106,12 @@ def _centre_window(height: int, width: int, size: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DepthFrame:
-    """One depth image with its geometry."""
+    """One depth image with its geometry.
+
+    Raises:
+        ConfigError: what is no float32 image in metres with NaN for "no return", no rigid pose, or of another
+            size than the intrinsics. `from_camera` takes images in the form that cameras give them.
+    """
 
     depth: NDArray[np.float32]
     """(H, W) z-depth [m], NaN = no return."""
@@ -110,12 +124,49 @@ class DepthFrame:
     """(H, W, 3) colour image of the same geometry, where one was asked for."""
 
     def __post_init__(self) -> None:
-        if self.depth.shape != (self.intrinsics.height, self.intrinsics.width):
-            raise ConfigError(
-                "depth image and intrinsics disagree in size",
-                got=self.depth.shape,
-                allowed=f"{(self.intrinsics.height, self.intrinsics.width)}",
-            )
+        if not isinstance(self.intrinsics, CameraIntrinsics):
+            raise ConfigError("no camera intrinsics", got=self.intrinsics, allowed="CameraIntrinsics")
+        shape = (self.intrinsics.height, self.intrinsics.width)
+        check_depth(self.depth, shape)
+        check_pose(self.T_world_camera, "T_world_camera")
+        if self.rgb is not None:
+            check_colour(self.rgb, shape)
+        if not (isinstance(self.time, Real) and math.isfinite(self.time)):
+            raise ConfigError("unusable time of a frame [s]", got=self.time, allowed="a finite number")
+
+    @classmethod
+    def from_camera(
+        cls,
+        depth: NDArray[np.generic],
+        *,
+        intrinsics: CameraIntrinsics,
+        T_world_camera: FloatArray,
+        unit: float,
+        no_return: float | Iterable[float],
+        time: float = 0.0,
+        rgb: NDArray[np.uint8] | None = None,
+    ) -> DepthFrame:
+        """Return the frame of a camera's own depth image; `mpgrasp.readings` has the table of cameras.
+
+        Args:
+            depth: (H, W) readings, z-depth along the optical axis.
+            intrinsics: of that image.
+            T_world_camera: (4, 4) pose of the OpenCV camera frame in the world.
+            unit: length that a reading of 1 stands for [m]: 0.001 for millimetres.
+            no_return: reading, or readings, of a pixel without a return; NaN is one always.
+            time: of the exposure [s].
+            rgb: (H, W, 3) colour image of the same geometry.
+
+        Raises:
+            ConfigError: an image, unit, pose or size that cannot be used.
+        """
+        return cls(
+            depth=metres(depth, unit, no_return),
+            intrinsics=intrinsics,
+            T_world_camera=T_world_camera,
+            time=time,
+            rgb=rgb,
+        )
 
     def world_points(self) -> FloatArray:
         """World points (H, W, 3) [m] of all pixels; NaN where there was no return."""

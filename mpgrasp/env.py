@@ -7,6 +7,9 @@ in the benchmark. Reference: https://gymnasium.farama.org/api/env/
 
 from __future__ import annotations
 
+import functools
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -26,8 +29,9 @@ from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import Episode
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.files.settings import refuse_unknown
 from mpgrasp.grasp import GraspMap
-from mpgrasp.plugins import load_detector
+from mpgrasp.plugins import check_name, detector_names, load_detector
 from mpgrasp.recording.watcher import Watcher
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite, episode_seed, load_suite
@@ -36,7 +40,7 @@ ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
 """Motion that an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds,
 though it descends at half of the vertical one."""
 FIRST_TRAINING_EPISODE = 2**20
-"""A reset without a seed plays an episode of this number or above, which no benchmark reaches."""
+"""Episodes of this number and above are drawn for training; below lie those of the benchmark."""
 
 _STEERED = [0, 1, 2, 5]  # components of a twist that an action sets
 
@@ -61,18 +65,24 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
     Info: `scene_seed`; `mppc_action` (4,), what MP-PC would do now, to imitate or to compare with; after the
     last step also `outcome`, `is_success`, `reflex` in words or "", and `result`, the `EpisodeResult`.
 
-    `reset(seed=k)` sets up episode k of the suite as the benchmark plays it with seed 0, whatever happened
-    before; without a seed, an episode drawn from `np_random`.
+    `reset()` draws an episode from `np_random`, which `reset(seed=...)` seeds, never one of the benchmark.
+    `reset(options={"episode": k})` sets up episode k of the suite as the benchmark plays it with seed 0,
+    whatever happened before.
+
+    An environment belongs to the thread that resets it first; several, each in a thread of its own, may run
+    at once. `AsyncVectorEnv` may fork its processes unless this one has used OpenGL, OpenVINO or torch, which
+    hang in forks: then the first reset says so, and `context="spawn"` works always.
 
     Args:
         suite: name, path or declaration of what is on the table.
-        detector: registry name, `module:Class`, or a detector; grasps and `quality` are its.
+        detector: registry name, `module:Class`, or a detector; grasps and `quality` are its. By name, it is
+            made at the first reset, so that it can run in the process that does that.
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
         render_mode: None or "rgb_array", a view of the whole scene.
 
     Raises:
-        ConfigError, WeightsError: a suite, detector or setting that cannot be used.
+        ConfigError: a suite, name or setting that cannot be used.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.DISABLED}  # noqa: RUF012
@@ -90,7 +100,10 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         self.metadata = dict(self.metadata)  # vector environments write into it
         self.render_mode = render_mode
         self.suite = load_suite(suite) if isinstance(suite, str) else suite
-        self.detector = _detector(detector, self.suite) if isinstance(detector, str) else detector
+        if isinstance(detector, str):
+            self._make_detector = _named(detector, self.suite)
+        else:
+            self.detector = detector
         self.config = config or self.suite.episode_config()
         self.mppc = Mppc(controller or _mppc_config(self.suite))
         start, z_min = self.config.start_height, self.mppc.config.z_min
@@ -107,12 +120,32 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         )
         self._episode: Episode | None = None
         self._watcher: Watcher | None = None
+        self._thread: threading.Thread | None = None
+
+    @functools.cached_property
+    def detector(self) -> GraspDetector:
+        """Detector whose grasps these are.
+
+        Raises:
+            ConfigError, WeightsError: it cannot be made, or not in a forked process.
+        """
+        return self._make_detector()
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observed, Info]:
-        """Set up the episode of that number; there are no options."""
-        super().reset(seed=seed)
+        """Set up an episode: one drawn for training, or with the option `episode` that of the benchmark.
+
+        Raises:
+            ConfigError: other options, a detector that cannot be used, another thread's episode, or
+                a process that was forked after OpenGL, OpenVINO or torch had started.
+            WeightsError: weights of the detector that cannot be used.
+        """
+        told = _episode_told(options)
         self.close()
-        number = int(self.np_random.integers(FIRST_TRAINING_EPISODE, 2**31)) if seed is None else seed
+        self._thread = threading.current_thread()
+        super().reset(seed=seed)
+        number = told
+        if number is None:
+            number = int(self.np_random.integers(FIRST_TRAINING_EPISODE, 2**31))
         scene, scene_seed = self.suite.scene_config(number), episode_seed(self.suite.name, 0, number)
         self._episode = Episode(scene, scene_seed, detector=self.detector, config=self.config)
         self._over = False
@@ -123,9 +156,10 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         """Move for one control tick, look, and at z_min grasp.
 
         Raises:
-            ConfigError: an action that is not four finite numbers.
+            ConfigError: an action that is not four finite numbers, or another thread than that of `reset`.
             gymnasium.error.ResetNeeded: there is no episode, or it is over.
         """
+        self._check_thread()
         episode = self._episode
         if episode is None or self._over:
             raise gymnasium.error.ResetNeeded("there is no episode, or it is over: call reset() first")
@@ -146,17 +180,34 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         """Return a picture (312, 352, 3) of the scene as it is now, or None without a render mode."""
         if self.render_mode is None:
             return None
+        self._check_thread()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("there is nothing to see: call reset() first")
         self._watcher = self._watcher or Watcher(self._episode.scene.model, self.config.camera_backend)
         return self._watcher.picture(self._episode.simulation.data)
 
     def close(self) -> None:
-        """Free cameras and the episode."""
+        """Free cameras and the episode, and the environment for another thread.
+
+        Raises:
+            ConfigError: the episode belongs to another thread, which runs.
+        """
+        self._check_thread()
+        self._thread = None
         for item in (self._episode, self._watcher):
             if item is not None:
                 item.close()
         self._episode = self._watcher = None
+
+    def _check_thread(self) -> None:
+        """Raise ConfigError if another thread has an episode here and may go on with it."""
+        owner = self._thread
+        if owner is not None and owner is not threading.current_thread() and owner.is_alive():
+            raise ConfigError(
+                "an environment belongs to the thread that has reset it",
+                got=threading.current_thread().name,
+                allowed=f"{owner.name}, any other after close() there, or one environment for each thread",
+            )
 
     def _look(self, episode: Episode) -> tuple[Observed, Info]:
         view = episode.look()
@@ -177,9 +228,25 @@ def _twist(action: ArrayLike) -> NDArray[np.float64]:
     return twist
 
 
-def _detector(name: str, suite: Suite) -> GraspDetector:
-    """Return the detector of that name, with the settings that the suite has for it."""
-    return load_detector(name, settings=detector_settings((name,), suite.detector)[name])
+def _named(name: str, suite: Suite) -> Callable[[], GraspDetector]:
+    """Return what makes the detector of that name, with the settings that the suite has for it."""
+    check_name("detector", name, detector_names())
+    settings = detector_settings((name,), suite.detector)[name]
+    return functools.partial(load_detector, name, settings=settings)
+
+
+def _episode_told(options: Info | None) -> int | None:
+    """Return the number of the benchmark's episode that options of `reset` ask for, None without one."""
+    if not options:
+        return None
+    refuse_unknown(options, ("episode",), "options of reset")
+    number = options["episode"]
+    whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
+    if not (whole and 0 <= number < FIRST_TRAINING_EPISODE):
+        raise ConfigError(
+            "no episode of the benchmark", got=number, allowed=f"0 to {FIRST_TRAINING_EPISODE - 1}"
+        )
+    return int(number)
 
 
 def _mppc_config(suite: Suite) -> ReachConfig:

@@ -12,15 +12,16 @@ class MpgraspError(Exception):
     """Base of every error that mpgrasp raises on purpose.
 
     Args:
-        wrong: what is wrong, as a short clause ("unknown suite").
+        wrong: what is wrong, as a short clause ("unknown suite"); an error that is raised again, as vector
+            environments do in their parent, gives its own words.
         got: the offending value, shown with `repr`.
         allowed: what would have worked; a sentence, or the allowed values.
     """
 
     def __init__(
-        self, wrong: str, *, got: object = None, allowed: str | Iterable[object] | None = None
+        self, wrong: str | Exception, *, got: object = None, allowed: str | Iterable[object] | None = None
     ) -> None:
-        parts = [wrong]
+        parts = [str(wrong)]
         if got is not None:
             parts.append(f"got {got!r}")
         if allowed is not None:

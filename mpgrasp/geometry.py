@@ -6,12 +6,46 @@ Quaternions are wxyz. Angles are radians.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpgrasp.exceptions import ConfigError
 from mpgrasp.linear_algebra import dot, norm, product
 
 FloatArray = NDArray[np.floating]
+
+MAX_SKEW = 1e-3
+"""Most that a rotation misses length 1 or a right angle by; stored calibrations have few digits."""
+MAX_DISTANCE = 100.0
+"""Farther from the world's origin no camera is that looks at a table [m]."""
+
+
+def check_pose(T: object, name: str) -> None:
+    """Raise ConfigError unless T is a rigid transform (4, 4): finite, orthonormal, right-handed, near."""
+    if not isinstance(T, np.ndarray) or T.shape != (4, 4) or not np.issubdtype(T.dtype, np.floating):
+        got = f"{T.dtype} {T.shape}" if isinstance(T, np.ndarray) else type(T).__name__
+        raise ConfigError(f"{name} is no pose", got=got, allowed="an array (4, 4) of floats")
+    # in plain numbers: that is faster for so few, and the same on every processor
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T.tolist()
+    products = (a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i)
+    lengths = (a * a + d * d + g * g - 1, b * b + e * e + h * h - 1, c * c + f * f + i * i - 1)
+    wrong = None
+    if not all(math.isfinite(number) for number in (*products, *lengths, x, y, z)):
+        wrong = "is not finite"
+    elif max(map(abs, (*products, *lengths))) > MAX_SKEW or last != [0, 0, 0, 1]:
+        wrong = "is no rigid transform"
+    elif a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
+        wrong = "is left-handed: one of its axes points the wrong way"
+    elif max(abs(x), abs(y), abs(z)) > MAX_DISTANCE:
+        wrong = "lies so far away that it looks like millimetres"
+    if wrong is not None:
+        raise ConfigError(
+            f"{name} {wrong}",
+            got=T.tolist(),
+            allowed="an orthonormal, right-handed rotation, a position [m], and 0 0 0 1",
+        )
 
 
 def transform(rotation: ArrayLike, position: ArrayLike) -> FloatArray:

@@ -27,7 +27,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
-from mpgrasp.geometry import FloatArray, invert, looking_down, transform_points, wrap_half_pi
+from mpgrasp.geometry import (
+    FloatArray,
+    check_pose,
+    invert,
+    looking_down,
+    transform_points,
+    wrap_half_pi,
+)
 
 RECTANGLE_JAW = 0.02
 """Nominal width of the jaws in grasp rectangles, across the closing direction [m].
@@ -93,6 +100,7 @@ class GraspMap:
                     got=getattr(self, name).shape,
                     allowed=f"{shape}",
                 )
+        check_pose(self.T_world_camera, "grasp map's T_world_camera")
 
     def world_points(self) -> FloatArray:
         """Return world points (H, W, 3) [m] of all pixels (eq. 3)."""

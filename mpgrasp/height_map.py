@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 
 
@@ -28,6 +30,16 @@ class HeightMap:
     """World y of row 0 [m]."""
     cell: float
     """Edge of a cell [m]."""
+
+    def __post_init__(self) -> None:
+        shapes = {array.shape for array in (self.height, self.support, self.label)}
+        if len(shapes) > 1 or self.height.ndim != 2 or not self.height.size:
+            raise ConfigError("maps of a height map differ in size", got=shapes, allowed="one size (ny, nx)")
+        place = (self.x0, self.y0, self.cell)
+        if not (all(map(math.isfinite, place)) and self.cell > 0):
+            raise ConfigError(
+                "unusable place or cell of a height map", got=place, allowed="finite, cell above 0"
+            )
 
     def cells(self, x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(row, col, inside) of world positions; rows and columns are clipped, `inside` tells where."""

@@ -251,6 +251,13 @@ def test_the_detector_of_the_documents_maps_a_frame() -> None:
     assert detector.predict(frame).quality.shape == (224, 224)
 
 
+def test_the_camera_s_frame_of_the_documents_can_be_made() -> None:
+    (block,) = re.findall(r"```python\n([^`]*from_camera.*?)```", DOCUMENTS["docs/extending.md"], re.DOTALL)
+    made: dict[str, Any] = {"z16": np.full((480, 640), 450, np.uint16), "T": looking_down([0.5, 0.0, 0.5])}
+    exec(block, made)
+    np.testing.assert_allclose(made["frame"].depth, 0.45, rtol=1e-6)
+
+
 def test_the_controller_of_the_documents_grasps() -> None:
     result = run_episode(
         SceneConfig(objects=("usb_stick",), half_extent=0.03),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +15,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.camera.rasteriser import require_gl
 from mpgrasp.controllers import make_controller
 from mpgrasp.controllers.config import MPPC
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
@@ -22,10 +26,10 @@ from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import run_episode
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import CameraError, ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
-from mpgrasp.suite import episode_seed, load_suite, parse_suite
+from mpgrasp.suite import Suite, episode_seed, load_suite, parse_suite
 
 STILL = np.zeros(4)
 DOWN = np.array([0.0, 0.0, -1.0, 0.0])
@@ -86,7 +90,7 @@ def test_a_suite_s_settings_are_those_of_the_environment() -> None:
 
 def play(env: GraspEnv, action: np.ndarray | None = None, most: int = 300) -> tuple[Any, ...]:
     """Step with one action, or with MP-PC's, from seed 0 to the end; number of steps, then the last step."""
-    _, info = env.reset(seed=0)
+    _, info = env.reset(options={"episode": 0})
     for k in range(1, most + 1):
         step = env.step(info["mppc_action"] if action is None else action)
         assert step[0] in env.observation_space
@@ -130,33 +134,143 @@ def test_with_the_actions_of_mppc_an_episode_ends_as_in_the_benchmark(make: Make
 
 def test_the_world_is_a_function_of_the_seed_and_not_of_what_was_done(make: Make) -> None:
     env, other = make("oracle"), make(Painter())
-    first, info = env.reset(seed=3)
+    first, info = env.reset(options={"episode": 3})
     assert info["scene_seed"] == episode_seed("thin", 0, 3)
     for _ in range(3):
         env.step(np.array([1.0, -1.0, -1.0, 1.0]))
     env.reset()
-    again, _ = env.reset(seed=3)
-    elsewhere, _ = other.reset(seed=3)
+    again, _ = env.reset(options={"episode": 3})
+    elsewhere, _ = other.reset(options={"episode": 3}, seed=1)
     for name in ("depth", "tcp", "yaw", "time"):
         np.testing.assert_array_equal(first[name], again[name])
         np.testing.assert_array_equal(first[name], elsewhere[name])
-    assert not np.array_equal(first["depth"], env.reset(seed=4)[0]["depth"])
+    assert not np.array_equal(first["depth"], env.reset(options={"episode": 4})[0]["depth"])
 
 
-def test_resets_without_a_seed_follow_np_random_and_stay_clear_of_the_benchmark(make: Make) -> None:
+def test_resets_follow_np_random_and_stay_clear_of_the_benchmark(make: Make) -> None:
     seeds = []
     for env in (make(Painter()), make(Painter())):
-        env.reset(seed=7)
-        seeds.append([env.reset()[1]["scene_seed"] for _ in range(3)])
+        seeds.append([env.reset(seed=seed)[1]["scene_seed"] for seed in (7, None, None)])
     drawn = np.random.default_rng(7).integers(FIRST_TRAINING_EPISODE, 2**31, 3)
     assert seeds[0] == seeds[1] == [episode_seed("thin", 0, int(number)) for number in drawn]
     assert drawn.min() >= FIRST_TRAINING_EPISODE
 
 
+def test_no_seed_of_training_begins_on_a_world_of_the_benchmark() -> None:
+    """Worlds of the first reset, whatever the seed, and of many after it, against those of three runs."""
+    played = {episode_seed("thin", run, k) for run in range(3) for k in range(5000)}
+    first = [np.random.default_rng(seed).integers(FIRST_TRAINING_EPISODE, 2**31) for seed in range(2000)]
+    later = np.random.default_rng(7).integers(FIRST_TRAINING_EPISODE, 2**31, 5000)
+    assert played.isdisjoint(episode_seed("thin", 0, int(number)) for number in (*first, *later))
+
+
+def test_many_environments_of_one_seed_begin_in_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`make_vec_env(seed=7)` of a learner gives its environments the seeds 7, 8, 9, ..."""
+    numbers: list[int] = []
+
+    def note(suite: Suite, number: int) -> Any:
+        numbers.append(number)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Suite, "scene_config", note)
+    for seed in range(7, 27):
+        with pytest.raises(KeyboardInterrupt):
+            GraspEnv(detector=Painter()).reset(seed=seed)
+    assert min(numbers) >= FIRST_TRAINING_EPISODE
+    assert len(set(numbers)) == 20
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"episodes": 3},
+        {"seed": 3},
+        {"episode": -1},
+        {"episode": 1.0},
+        {"episode": True},
+        {"episode": "3"},
+        {"episode": None},
+        {"episode": FIRST_TRAINING_EPISODE},
+        {"episode": 3, "suite": "thin"},
+    ],
+    ids=str,
+)
+def test_options_that_reset_does_not_know_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=r"episode"):
+        GraspEnv(detector=Painter()).reset(options=options)
+
+
+def test_a_detector_by_name_is_checked_at_once_and_made_at_the_first_reset() -> None:
+    for name, said in (("nonsense", "unknown detector"), ("fakes:NoSuchDetector", "NoSuchDetector")):
+        with pytest.raises(ConfigError, match=said):
+            GraspEnv(detector=name)
+    env = GraspEnv(detector="fakes:FailsToStart")
+    with pytest.raises(ConfigError, match="no licence"):
+        env.reset()
+
+
+def require_gl_here() -> None:
+    try:
+        require_gl()
+    except CameraError as error:
+        pytest.skip(str(error))
+
+
+def in_a_thread(call: Callable[[], object]) -> object:
+    """Return what a call gives in a thread of its own, or the error that it raises."""
+    given: list[object] = []
+
+    def run() -> None:
+        try:
+            given.append(call())
+        except Exception as error:
+            given.append(error)
+
+    thread = threading.Thread(target=run, name="other")
+    thread.start()
+    thread.join(60)
+    assert given, "it hangs"
+    return given[0]
+
+
+@pytest.mark.parametrize("backend", BACKENDS[1:])
+def test_an_environment_belongs_to_its_thread_until_it_is_closed(make: Make, backend: str) -> None:
+    if backend == "gl":
+        require_gl_here()
+    env = make(Painter(), camera_backend=backend)
+    first = env.reset(options={"episode": 0})[0]
+    for call in (lambda: env.step(STILL), lambda: env.reset(), env.close):
+        refused = in_a_thread(call)
+        assert isinstance(refused, ConfigError)
+        assert "belongs to the thread" in str(refused)
+        assert "MainThread, any other after close()" in str(refused)
+    env.step(STILL)
+    env.close()
+    again = in_a_thread(lambda: env.reset(options={"episode": 0}))
+    assert isinstance(again, tuple)
+    np.testing.assert_array_equal(again[0]["depth"], first["depth"])
+    # that thread has ended, so that nobody can go on with its episode
+    np.testing.assert_array_equal(env.reset(options={"episode": 0})[0]["depth"], first["depth"])
+
+
+def test_environments_in_threads_of_their_own_see_what_one_alone_sees() -> None:
+    def play_a_little() -> list[np.ndarray]:
+        env = GraspEnv(detector=Painter())
+        seen = [env.reset(options={"episode": 2})[0]["depth"]]
+        seen += [env.step(DOWN)[0]["depth"] for _ in range(3)]
+        env.close()
+        return seen
+
+    alone = play_a_little()
+    with ThreadPoolExecutor(3) as pool:
+        for seen in [future.result(60) for future in [pool.submit(play_a_little) for _ in range(3)]]:
+            np.testing.assert_array_equal(seen, alone)
+
+
 def test_an_action_is_a_velocity_in_units_of_the_documented_scale(make: Make) -> None:
     env = make(Painter(), noise=False)
     action = np.array([0.8, -1.0, 0.5, 1.0])
-    env.reset(seed=0)
+    env.reset(options={"episode": 0})
     for _ in range(4):  # the ramp
         before = env.step(action)[0]
     for _ in range(3):
@@ -169,9 +283,9 @@ def test_an_action_is_a_velocity_in_units_of_the_documented_scale(make: Make) ->
 
 def test_actions_are_cut_at_the_box_and_refused_where_they_mean_nothing(make: Make) -> None:
     env = make(Painter())
-    env.reset(seed=0)
+    env.reset(options={"episode": 0})
     at_the_bound = env.step(DOWN)[0]
-    env.reset(seed=0)
+    env.reset(options={"episode": 0})
     np.testing.assert_array_equal(env.step(7 * DOWN)[0]["tcp"], at_the_bound["tcp"])
     for action in (np.full(4, np.nan), np.zeros(3)):
         with pytest.raises(ConfigError, match="4 finite numbers"):
@@ -179,7 +293,7 @@ def test_actions_are_cut_at_the_box_and_refused_where_they_mean_nothing(make: Ma
 
 
 def test_depth_is_that_of_the_table_and_zero_where_nothing_returned(make: Make) -> None:
-    observed, _ = make(Painter(), start_height=0.45).reset(seed=0)
+    observed, _ = make(Painter(), start_height=0.45).reset(options={"episode": 0})
     depth = observed["depth"]
     assert (depth == 0).any()
     # the optical centre lies 63 mm above the tcp; cloth and stick are a few millimetres high
@@ -187,8 +301,8 @@ def test_depth_is_that_of_the_table_and_zero_where_nothing_returned(make: Make) 
 
 
 def test_quality_lies_on_the_pixels_of_depth_whatever_the_detector_sees(make: Make) -> None:
-    whole = make(Painter()).reset(seed=0)[0]["quality"]
-    part = make(Painter(crop=200, size=300)).reset(seed=0)[0]["quality"]
+    whole = make(Painter()).reset(options={"episode": 0})[0]["quality"]
+    part = make(Painter(crop=200, size=300)).reset(options={"episode": 0})[0]["quality"]
     seen = np.abs(np.arange(224) - 111.5) < 200 / 350 * 112 - 1
     np.testing.assert_allclose(part[np.ix_(seen, seen)], whole[np.ix_(seen, seen)], atol=2e-3)
     beyond = np.abs(np.arange(224) - 111.5) > 200 / 350 * 112 + 1

@@ -39,3 +39,9 @@ def test_every_error_is_caught_as_mpgrasp_error_and_survives_the_way_between_pro
 
 def test_config_errors_are_value_errors() -> None:
     assert issubclass(ConfigError, ValueError)
+
+
+def test_an_error_raised_again_keeps_its_words() -> None:
+    """As gymnasium's vector environments do with the errors of their processes: class(error)."""
+    error = ConfigError("unknown suite", got="x", allowed=("a", "b"))
+    assert str(type(error)(error)) == str(error)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import (
+    check_pose,
     invert,
     line_angle_difference,
     look_at,
@@ -96,3 +98,39 @@ def test_a_quaternion_turns_as_in_scipy_and_as_in_mujoco() -> None:
         mujoco.mju_quat2Mat(expected, wxyz)
         np.testing.assert_allclose(R.ravel(), expected, rtol=0, atol=1e-15)
     np.testing.assert_array_equal(rotation_from_quaternion((1.0, 0.0, 0.0, 0.0)), np.eye(3))
+
+
+def _changed(row: int, col: int, value: float) -> np.ndarray:
+    T = looking_down([0.5, -0.1, 0.4], 0.7)
+    T[row, col] = value
+    return T
+
+
+POSES = {
+    "nan": (_changed(0, 3, np.nan), "not finite"),
+    "infinite": (_changed(1, 1, np.inf), "not finite"),
+    "sheared": (_changed(0, 1, 0.2), "no rigid transform"),
+    "scaled": (np.diag([1.01, 1.01, 1.01, 1.0]), "no rigid transform"),
+    "zeros": (np.zeros((4, 4)), "no rigid transform"),
+    "transposed": (looking_down([0.5, -0.1, 0.4], 0.7).T, "no rigid transform"),
+    "mirrored": (np.diag([1.0, 1.0, -1.0, 1.0]), "left-handed"),
+    "millimetres": (looking_down([500.0, -100.0, 400.0]), "looks like millimetres"),
+    "3x4": (np.eye(4)[:3], r"no pose; got 'float64 \(3, 4\)'"),
+    "rotation": (np.eye(3), "no pose"),
+    "integers": (np.eye(4, dtype=int), "no pose; got 'int64"),
+    "list": (np.eye(4).tolist(), "no pose; got 'list'"),
+}
+
+
+@pytest.mark.parametrize(("T", "said"), POSES.values(), ids=POSES)
+def test_what_is_no_rigid_pose_in_metres_is_refused_by_name(T: object, said: str) -> None:
+    with pytest.raises(ConfigError, match=f"T_world_camera.*{said}"):
+        check_pose(T, "T_world_camera")
+
+
+def test_poses_of_few_digits_are_taken() -> None:
+    for seed in range(50):
+        turn = np.random.default_rng(seed).uniform(-3, 3, 3)
+        T = looking_down([0.5, -0.1, 0.4], turn[0]) @ transform(rotation_x(turn[1]), [0, 0, 0])
+        check_pose(T.round(4), "T")
+        check_pose(T.astype(np.float32), "T")

@@ -201,3 +201,8 @@ def test_peaks_of_an_empty_map_are_none_and_of_a_flat_top_are_one() -> None:
     flat = np.zeros((40, 40))
     flat[10:15, 10:15] = 1
     assert len(peaks(flat, distance=10)) == 1
+
+
+def test_a_map_whose_camera_has_no_pose_is_refused() -> None:
+    with pytest.raises(ConfigError, match="grasp map's T_world_camera is no rigid transform"):
+        replace(random_map(0.0, np.random.default_rng(2)), T_world_camera=np.zeros((4, 4)))

@@ -17,9 +17,9 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "linear_algebra", "geometry", "paths", "outcome", "workspace",
+    "exceptions", "forking", "linear_algebra", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics",
-    "depth", "height_map", "grasp",
+    "readings", "depth", "height_map", "grasp",
     "robot", "camera",
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import os
 import platform
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import CameraError
+from mpgrasp.forking import OPENGL, refuse_inherited, starting
 from mpgrasp.geometry import FloatArray
 
 NEAR = 0.02
@@ -32,6 +34,8 @@ _CATEGORIES = mujoco.mjtCatBit.mjCAT_STATIC.value | mujoco.mjtCatBit.mjCAT_DYNAM
 _SHADOW_MAP = 1024
 _COLOUR_SAMPLES = 4
 _SLICES = 64
+
+_left_behind: list[Any] = []  # that it would take another thread or process to free
 
 
 def require_gl() -> None:
@@ -69,7 +73,13 @@ def _no_gl(error: Exception) -> CameraError:
 
 
 def _new_gl_context() -> Any:
-    """A current off-screen GL context; EGL on Linux unless `MUJOCO_GL` asks for another."""
+    """A current off-screen GL context; EGL on Linux unless `MUJOCO_GL` asks for another.
+
+    Raises:
+        ConfigError: this process was forked from one with OpenGL, in which no frame would ever come.
+        CameraError: there is no GL on this machine.
+    """
+    starting(OPENGL)
     try:
         if platform.system() == "Linux" and not os.environ.get("MUJOCO_GL"):
             # mujoco picks glfw by itself, which needs a display
@@ -136,6 +146,7 @@ class Rasteriser:
         geom_groups: tuple[int, ...] = (0, 1, 2),
     ) -> None:
         fine = fine and colour
+        self._owner = _here()
         self._model = model
         self._intrinsics = intrinsics
         self._colour = colour
@@ -165,9 +176,14 @@ class Rasteriser:
 
         Returns:
             (H, W) float32 z-depth [m], NaN where nothing is seen; or (H, W, 3) uint8 colour.
+
+        Raises:
+            CameraError: it was closed, or made by another thread.
+            ConfigError: it was made before this process was forked.
         """
         if self._context is None:
             raise CameraError("the camera was closed", allowed="a new camera")
+        self._check_owner()
         self._gl.make_current()
         if not self._colour:
             _mask_colour()
@@ -201,17 +217,37 @@ class Rasteriser:
         eye.orthographic = 0
 
     def close(self) -> None:
-        """Free the GL resources; the object is of no use afterwards."""
+        """Free the GL resources; the object is of no use afterwards.
+
+        Another thread than the maker's, or a forked process, cannot free them: they last as long as it does.
+        """
         context, self._context = self._context, None
         if context is not None:
+            if self._owner != _here():
+                _left_behind.append((context, self._gl))
+                return
             self._gl.make_current()
             context.free()
             self._gl.free()
+
+    def _check_owner(self) -> None:
+        """Raise an error unless this is the process and the thread that made the GL context."""
+        if self._owner != _here():
+            refuse_inherited(OPENGL)
+            raise CameraError(
+                "a camera is used in another thread than the one that made it",
+                got=threading.current_thread().name,
+                allowed='one camera for each thread, as OpenGL asks for, or backend "ray"',
+            )
 
     def __del__(self) -> None:
         # MuJoCo's context has to be freed under its own GL context; at exit that may be gone already
         with contextlib.suppress(Exception):
             self.close()
+
+
+def _here() -> tuple[int, int]:
+    return os.getpid(), threading.get_ident()
 
 
 def _mask_colour() -> None:

@@ -119,7 +119,8 @@ def tiny(side: int) -> FloatArray:
     ],
 )
 def test_an_image_that_says_nothing_has_no_grasp(depth: FloatArray, detector: GraspDetector) -> None:
-    image = frame(depth)
+    image = frame(np.where(np.isfinite(depth) & (depth > 0), depth, np.nan))
+    image.depth[:] = depth  # after its check: who writes into a frame is not refused
     image.depth.flags.writeable = False
     maps = detector.predict(image)
     assert not maps.quality.any()

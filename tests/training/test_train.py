@@ -13,7 +13,7 @@ import pytest
 import torch
 from toy_training import SMALL
 
-from mpgrasp.detectors.networks.weights import read_card
+from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training import trainer as trainer_module
 from mpgrasp.training.__main__ import main

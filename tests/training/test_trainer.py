@@ -12,8 +12,9 @@ import torch
 from toy_training import trainer
 
 from mpgrasp.detectors.network_detector import NetworkDetector
+from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.weights import load_weights, read_card
+from mpgrasp.detectors.networks.weights import load_weights
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training.metrics import match_labels
 from mpgrasp.training.progress import ProgressLog

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 HEADS = ("pos", "cos", "sin", "width")
 """Outputs of every network in this order; `<head>_output` in checkpoints."""
+MAX_CHANNELS = 4096
+"""Most channels that a setting of a network may ask for; weights that ask for more are no weights."""
+MAX_REPEATS = 16
+"""Most blocks or modules in a row that a setting may ask for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +37,15 @@ class NetworkDeclaration:
 
     network: Callable[[Any], nn.Module]
     """Class of the network, which is made from its config."""
-    config: Callable[..., Any]
+    config: type[Any]
     """Config dataclass; its fields are the settings in a weights file. It has `channels`, and `size` if the
     network fits images of one size only."""
     source: str
     """Publication, in Markdown, for docs/networks.md."""
     input_size: int = NETWORK_SIZE
     """Side of the images that the network was designed for [px]."""
+    multiple_of: int = 1
+    """The network's maps have the size of its image if that is a multiple of this [px]."""
     variants: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {"authors": {}})
     """Settings by name of the sizes that docs/networks.md lists; without settings, for all modalities."""
     published: PublishedWeights | None = None

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.declaration import NetworkDeclaration
+from mpgrasp.detectors.networks.declaration import MAX_CHANNELS, MAX_REPEATS, NetworkDeclaration
 from mpgrasp.detectors.networks.grasp_network import BN_MOMENTUM, GraspNetwork, conv_bn, resize
 from mpgrasp.exceptions import ConfigError
 
@@ -68,10 +68,14 @@ class DHRNetConfig:
     def __post_init__(self) -> None:
         # JSON knows no tuples
         object.__setattr__(self, "modules", tuple(self.modules))
-        sizes = (self.channels, self.width, self.blocks, self.stem_width, self.stem_blocks, self.head_width)
-        if len(self.modules) != 3 or min(*sizes, *self.modules) < 1:
+        sizes = (self.channels, self.width, self.stem_width, self.head_width)
+        repeats = (self.blocks, self.stem_blocks, *self.modules)
+        few = min(*sizes, *repeats) < 1
+        if len(self.modules) != 3 or few or max(sizes) > MAX_CHANNELS or max(repeats) > MAX_REPEATS:
             raise ConfigError(
-                "unusable DHRNet settings", got=self, allowed="sizes of 1 or more, three counts of modules"
+                "unusable DHRNet settings",
+                got=self,
+                allowed=f"1 to {MAX_CHANNELS} channels, 1 to {MAX_REPEATS} blocks, three counts of modules",
             )
         if self.head not in HEAD_BRANCHES:
             raise ConfigError("unknown head of a DHRNet", got=self.head, allowed=HEAD_BRANCHES)

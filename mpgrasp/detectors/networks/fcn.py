@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.declaration import NetworkDeclaration
+from mpgrasp.detectors.networks.declaration import MAX_CHANNELS, MAX_REPEATS, NetworkDeclaration
 from mpgrasp.detectors.networks.grasp_network import GraspNetwork, conv_bn, resize
 from mpgrasp.exceptions import ConfigError
 
@@ -35,8 +35,13 @@ class FCNConfig:
     """Blocks of two convolutions at each level, down and up."""
 
     def __post_init__(self) -> None:
-        if min(self.channels, self.width, self.blocks) < 1:
-            raise ConfigError("unusable FCN settings", got=self, allowed="sizes of 1 or more")
+        sizes = (self.channels, self.width)
+        if min(*sizes, self.blocks) < 1 or max(sizes) > MAX_CHANNELS or self.blocks > MAX_REPEATS:
+            raise ConfigError(
+                "unusable FCN settings",
+                got=self,
+                allowed=f"1 to {MAX_CHANNELS} channels, 1 to {MAX_REPEATS} blocks",
+            )
 
 
 class FCN(GraspNetwork):

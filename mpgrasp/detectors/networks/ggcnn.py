@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from mpgrasp.detectors.networks.declaration import HEADS, NetworkDeclaration, PublishedWeights
+from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, NetworkDeclaration, PublishedWeights
 from mpgrasp.exceptions import ConfigError
 
 
@@ -23,8 +23,8 @@ class GGCNNConfig:
     """Input channels."""
 
     def __post_init__(self) -> None:
-        if self.channels < 1:
-            raise ConfigError("unusable GG-CNN settings", got=self, allowed="at least one channel")
+        if not 1 <= self.channels <= MAX_CHANNELS:
+            raise ConfigError("unusable GG-CNN settings", got=self, allowed=f"1 to {MAX_CHANNELS} channels")
 
 
 class _GGCNN(nn.Module):
@@ -111,12 +111,14 @@ DECLARATIONS = {
         config=GGCNNConfig,
         source="[GG-CNN](https://arxiv.org/abs/1804.05172)",
         input_size=300,
+        multiple_of=12,
         published=PublishedWeights(entry="conv1.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD),
     ),
     "ggcnn2": NetworkDeclaration(
         network=GGCNN2,
         config=GGCNNConfig,
         source="[GG-CNN2](https://doi.org/10.1177/0278364919859066)",
+        multiple_of=4,
         published=PublishedWeights(
             entry="features.0.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD
         ),

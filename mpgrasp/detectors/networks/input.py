@@ -19,6 +19,12 @@ from mpgrasp.exceptions import ConfigError
 
 CHANNELS = {"d": 1, "rgb": 3, "rgbd": 4}
 """Input channels by modality."""
+MIN_SIZE, MAX_SIZE = 32, 1024
+"""Sides of the images that networks are fed [px]."""
+MAX_CLIP = 100.0
+"""Widest bound on a residual of depth [m]."""
+MAX_SCALE = 1e4
+"""Most input units per metre: a tenth of a millimetre is 1."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +49,13 @@ class NetworkInput:
             raise ConfigError("unknown modality of an input", got=self.modality, allowed=tuple(CHANNELS))
         if self.centre not in ("mean", "median"):
             raise ConfigError("unknown centre of a depth image", got=self.centre, allowed=("mean", "median"))
-        if self.size < 32 or min(self.clip, self.scale) <= 0:
+        fits = MIN_SIZE <= self.size <= MAX_SIZE and 0 < self.clip <= MAX_CLIP and 0 < self.scale <= MAX_SCALE
+        if not (fits and isinstance(self.size, int)):
             raise ConfigError(
-                "unusable network input", got=self, allowed="size from 32, clip and scale above 0"
+                "unusable network input",
+                got=self,
+                allowed=f"size {MIN_SIZE} to {MAX_SIZE}, clip above 0 up to {MAX_CLIP:g}, scale above 0 up to"
+                f" {MAX_SCALE:g}",
             )
         if range_channel:
             raise ConfigError("an input with a range channel", got=range_channel, allowed="d, rgb, rgbd")

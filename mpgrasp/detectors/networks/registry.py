@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpgrasp.detectors.networks.declaration import NetworkDeclaration
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.forking import refuse_inherited_torch
 
 if TYPE_CHECKING:
     from torch import nn
@@ -49,9 +50,10 @@ def build_network(name: str, settings: Mapping[str, Any]) -> nn.Module:
     """Return the network of that name with fresh weights; `settings` are keyword arguments of its config.
 
     Raises:
-        ConfigError: unknown name or settings.
+        ConfigError: unknown name or settings, or a process that torch would hang in.
     """
     declared = declaration(name)
+    refuse_inherited_torch()
     try:
         return declared.build(settings)
     except TypeError as error:

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.networks.declaration import HEADS, NetworkDeclaration
+from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, MAX_REPEATS, NetworkDeclaration
 from mpgrasp.exceptions import ConfigError
 
 PATCH = 4
@@ -57,12 +57,15 @@ class TFGraspConfig:
         # JSON knows no tuples
         object.__setattr__(self, "depths", tuple(self.depths))
         object.__setattr__(self, "heads", tuple(self.heads))
-        sizes = (self.channels, self.size, self.embed, self.window, self.mlp_ratio, *self.depths, *self.heads)
-        if min(sizes) < 1 or len(self.depths) != len(self.heads) or not 0 <= self.drop_path < 1:
+        repeats = (self.window, self.mlp_ratio, len(self.depths), *self.depths)
+        sizes = (self.channels, self.size, self.embed, *self.heads, *repeats)
+        many = max(sizes) > MAX_CHANNELS or max(repeats) > MAX_REPEATS
+        if many or min(sizes) < 1 or len(self.depths) != len(self.heads) or not 0 <= self.drop_path < 1:
             raise ConfigError(
                 "unusable TF-Grasp settings",
                 got=self,
-                allowed="sizes of 1 or more, as many depths as heads, drop_path from 0 to below 1",
+                allowed=f"sizes of 1 to {MAX_CHANNELS}, window, mlp_ratio, depths and their number of 1 to"
+                f" {MAX_REPEATS}, as many depths as heads, drop_path from 0 to below 1",
             )
         if any(self.embed * 2**k % h for k, h in enumerate(self.heads)):
             raise ConfigError("attention heads that do not share out the channels", got=self.heads)

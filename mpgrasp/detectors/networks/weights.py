@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import SafetensorError
 from safetensors.torch import save_file
 from torch import nn
 
 from mpgrasp import paths
 from mpgrasp.depth import NETWORK_SIZE
+from mpgrasp.detectors.networks.description import FORMAT, opened, read_description
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.registry import NETWORKS, build_network, check_network, declaration
+from mpgrasp.detectors.networks.state import (
+    check_entries,
+    check_numbers,
+    entries,
+    needed_entries,
+    stored_entries,
+)
 from mpgrasp.exceptions import OutputError, WeightsError
+from mpgrasp.files.json_values import json_value
 
-FORMAT = "mpgrasp-weights-1"
 WIDTH_SHARE = 0.5
 """Opening that a width output of 1 stands for in networks trained here, as a share of their image's side: 150
 of 300 px, as in the published GG-CNN files."""
@@ -61,7 +68,7 @@ def save_weights(
         "settings": json.dumps(dict(weights.settings)),
         "input": json.dumps(asdict(weights.input)),
         "width_px": json.dumps(weights.width_px),
-        "card": json.dumps(dict(weights.card)),
+        "card": json.dumps(json_value(weights.card)),
     }
     tensors = {k: v.detach().cpu().contiguous() for k, v in (state or weights.network.state_dict()).items()}
     temporary = path.with_name(path.name + ".part")
@@ -95,59 +102,26 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
     return loaded
 
 
-def read_card(path: Path | str) -> dict[str, Any]:
-    """Return all that a safetensors file says about itself: network, settings, input and training card.
-
-    Raises:
-        WeightsError: the file is unreadable or of another make.
-    """
-    try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-    except (OSError, SafetensorError) as error:
-        raise WeightsError(f"weights cannot be read: {error}", got=str(path)) from error
-    if metadata.get("format") != FORMAT:
-        raise WeightsError(
-            "not a weights file of mpgrasp", got=str(path), allowed=f"safetensors with format {FORMAT}"
-        )
-    try:
-        keys = ("settings", "input", "width_px", "card")
-        return {"network": metadata["network"], **{k: json.loads(metadata[k]) for k in keys}}
-    except (KeyError, json.JSONDecodeError) as error:
-        raise WeightsError(f"weights with a broken description: {error!r}", got=str(path)) from error
-
-
 def _read_safetensors(name: str, path: Path) -> NetworkWeights:
-    about = read_card(path)
-    if about["network"] != name:
-        raise WeightsError(f"weights of another network, not of {name}", got=about["network"], allowed=name)
-    try:
-        with safe_open(path, framework="pt") as file:
-            state = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
-        network = build_network(name, about["settings"])
-        image = NetworkInput(**about["input"])
-        width_px = float(about["width_px"])
-    except (OSError, SafetensorError, ValueError, TypeError) as error:  # a ConfigError is a ValueError
-        raise WeightsError(f"weights cannot be used: {error}", got=str(path)) from error
-    if not (math.isfinite(width_px) and width_px > 0):
-        raise WeightsError("weights with a wrong unit of width", got=width_px, allowed="above 0 px")
-    channels = about["settings"].get("channels", 1)
-    if channels != image.channels:
+    about = read_description(path)
+    if about.network != name:
         raise WeightsError(
-            "weights with a wrong number of channels", got=channels, allowed=str(image.channels)
+            f"{path}: weights of another network, not of {name}", got=about.network, allowed=name
         )
-    if getattr(network.config, "size", image.size) != image.size:
-        raise WeightsError(
-            "weights for images of another size", got=network.config.size, allowed=str(image.size)
-        )
-    _load_state(network, state, path)
+    needed = needed_entries(name, about.settings)
+    with opened(path) as file:
+        check_entries(stored_entries(file), needed, path)
+        state = {key: file.get_tensor(key) for key in needed}
+    check_numbers(state, path)
+    network = build_network(name, about.settings)
+    network.load_state_dict(state)
     return NetworkWeights(
         name=name,
         network=network,
-        settings=about["settings"],
-        input=image,
-        width_px=width_px,
-        card=about["card"],
+        settings=about.settings,
+        input=about.input,
+        width_px=about.width_px,
+        card=about.card,
     )
 
 
@@ -155,22 +129,25 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
     declared = declaration(name)
     if declared.published is None:
         raise WeightsError(f"{name} reads safetensors only", got=str(path), allowed="a .safetensors file")
+    allowed = f"a published state dict of {name}"
     try:
         # weights_only: a pickle from elsewhere must not run code
         state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no common base for what a junk file may raise
+        raise WeightsError("not a PyTorch file of tensors", got=str(path), allowed=allowed) from error
+    if not (isinstance(state, dict) and all(map(_is_tensor, state.items()))):
         raise WeightsError(
-            "not a PyTorch file of tensors", got=str(path), allowed=f"a published state dict of {name}"
-        ) from error
-    if not isinstance(state, dict) or not all(isinstance(v, torch.Tensor) for v in state.values()):
-        raise WeightsError("not a state dict", got=str(path), allowed=f"a published state dict of {name}")
+            f"{path}: not a state dict of dense tensors", got=type(state).__name__, allowed=allowed
+        )
     if declared.published.entry not in state:
         for other in NETWORKS:
             published = declaration(other).published
             if published is not None and published.entry in state:
                 raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
     network = build_network(name, {})
-    _load_state(network, state, path)
+    check_entries(entries(state), entries(network.state_dict()), path)
+    check_numbers(state, path)
+    network.load_state_dict(state)
     return NetworkWeights(
         name=name,
         network=network,
@@ -181,16 +158,7 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
     )
 
 
-def _load_state(network: nn.Module, state: Mapping[str, torch.Tensor], path: Path) -> None:
-    expected = {key: tuple(value.shape) for key, value in network.state_dict().items()}
-    found = {key: tuple(value.shape) for key, value in state.items()}
-    if expected != found:
-        odd = sorted(key for key in expected.keys() | found.keys() if expected.get(key) != found.get(key))
-        raise WeightsError(
-            f"weights do not fit the network, first at {odd[0]}: shape {found.get(odd[0], 'missing')}",
-            got=str(path),
-            allowed=str(expected.get(odd[0], "no such entry")),
-        )
-    if not all(torch.isfinite(value).all() for value in state.values()):
-        raise WeightsError("weights that are not finite", got=str(path), allowed="finite numbers")
-    network.load_state_dict(state)
+def _is_tensor(item: tuple[object, object]) -> bool:
+    key, value = item
+    dense = isinstance(value, torch.Tensor) and value.layout == torch.strided and not value.is_quantized
+    return isinstance(key, str) and dense

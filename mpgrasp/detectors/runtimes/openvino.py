@@ -29,6 +29,7 @@ from torch import nn
 from mpgrasp import paths
 from mpgrasp.detectors.networks.weights import NetworkWeights
 from mpgrasp.files.atomic import replace_file
+from mpgrasp.forking import OPENVINO, refuse_inherited, starting
 
 Float32 = NDArray[np.float32]
 
@@ -73,6 +74,7 @@ class OpenVinoRuntime:
         self._request = _core().import_model(blob, _DEVICE, settings).create_infer_request()
 
     def __call__(self, image: Float32) -> Float32:
+        refuse_inherited(OPENVINO)
         x = np.ascontiguousarray(image[None], np.float32)
         outputs = self._request.infer([x], share_inputs=True, share_outputs=True)
         return np.array(outputs[0][0], np.float32)
@@ -88,8 +90,13 @@ def openvino_precision() -> str | None:
     return "bf16" if "BF16" in capabilities else "f32"
 
 
-@functools.cache
 def _core() -> Any:
+    starting(OPENVINO)
+    return _made_core()
+
+
+@functools.cache
+def _made_core() -> Any:
     return _openvino().Core()
 
 

@@ -24,6 +24,7 @@ from mpgrasp.detectors.networks.weights import NetworkWeights
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.forking import refuse_inherited_torch
 
 Float32 = NDArray[np.float32]
 
@@ -65,6 +66,7 @@ class TorchRuntime:
         self._network = network.to(memory_format=self._layout)  # type: ignore[call-overload]
 
     def __call__(self, image: Float32) -> Float32:
+        refuse_inherited_torch()
         x = torch.from_numpy(np.ascontiguousarray(image))[None].to(self.device, memory_format=self._layout)
         # without these, cuDNN rounds to 10 bits and may take another algorithm at the next call
         exact = torch.backends.cudnn.flags(

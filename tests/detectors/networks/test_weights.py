@@ -9,12 +9,12 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.detectors.networks.weights import (
     NetworkWeights,
     load_weights,
-    read_card,
     save_weights,
     width_unit,
 )
