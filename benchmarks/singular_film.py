@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from mpgrasp.recording.recorder import TickRecord
     from mpgrasp.scene.simulation import Simulation
 
-SUITE, EPISODE = "thin_2mm", 10
+SUITE, EPISODE = "thin_2mm", 95
 CONTROLLERS = ("mvp", "mppc")
 OUT = Path(__file__).resolve().parent.parent / "docs" / "singular"
 MAX_BYTES = 1_400_000
