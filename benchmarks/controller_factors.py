@@ -147,7 +147,7 @@ def draw(rows: Sequence[Mapping[str, Any]], thicknesses: Sequence[float], worlds
         axes.set(title=measure.title, yticks=range(len(order)))
         axes.set_yticklabels([NAMES[name] for name in order] if axes is panels[0] else [])
     panels[0].set_xlabel("effect of the change; bars: 95 %, worlds bootstrapped")
-    panels[-1].legend(loc="lower right", fontsize=10)
+    picture.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower right", ncols=4)
     return picture
 
 

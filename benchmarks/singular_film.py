@@ -2,7 +2,7 @@
 
     python benchmarks/singular_film.py
 
-Writes `OUT.gif`, both episodes side by side on one clock, and `OUT.png`: the ways of the camera seen from
+Writes `OUT.webp`, both episodes side by side on one clock, and `OUT.png`: the ways of the camera seen from
 above, coloured by the smallest singular value of the tool Jacobian, and that value against time.
 """
 
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from study import Parser, figure, not_negative, prepare, run_command
+from study import Parser, figure, not_negative, prepare, run_command, style
 
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replacing
@@ -36,7 +36,7 @@ MAX_BYTES = 1_400_000
 """A film that gets larger is written again with fewer pictures a second."""
 WARNING = 0.05
 """Smallest singular value below which a posture is called singular."""
-_RATES = (5, 4, 3, 2, 1)  # pictures a second, the first that is small enough is taken [Hz]
+_RATES = (8, 5, 4, 3, 2, 1)  # pictures a second, the first that is small enough is taken [Hz]
 _LAST = 2.0  # for which the end stands still [s]
 _CROP = 496  # width of a film's picture that is shown: the scene and the first column of maps [px]
 
@@ -66,6 +66,15 @@ class Way:
 
     def finish(self, event: str) -> None:
         self.event = event
+
+
+def titled(picture: Picture, name: str) -> Picture:
+    """Return a picture with a name in its corner."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(picture)
+    ImageDraw.Draw(image).text((10, 8), name, fill=(255, 255, 255), font=ImageFont.load_default(22))
+    return np.asarray(image)
 
 
 def side_by_side(films: Sequence[tuple[Sequence[float], Sequence[Picture]]], rate: float) -> list[Picture]:
@@ -124,9 +133,9 @@ def draw(ways: dict[str, Way]) -> Figure:
         lines.set_array(values[1:])
         axes.add_collection(lines)
         axes.plot(*at[0], "o", color="black", markersize=8, label="start")
-        worst = int(np.argmin(values))
+        worst = int(np.argmin(way.singular_values))
         axes.scatter(
-            *at[worst], c=[values[worst]], cmap="turbo_r", norm=norm, s=170, marker="X",
+            at[worst, 0], at[worst, 1], c=[values[worst]], cmap="turbo_r", norm=norm, s=170, marker="X",
             edgecolors="black", zorder=3, label="smallest value",
         )  # fmt: skip
         if way.stick is not None:
@@ -134,7 +143,7 @@ def draw(ways: dict[str, Way]) -> Figure:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x [m]")
         axes.set_title(f"{name}: {way.event.split(':')[0]}")
     panels[0].set_ylabel("y [m], camera from above")
-    panels[0].legend(loc="best")
+    panels[len(ways) - 1].legend(loc="lower right")
     label = "smallest singular value (0.01 and less: darkest red)"
     picture.colorbar(lines, ax=panels[: len(ways)], label=label, location="bottom", aspect=50)
     _against_time(panels[-1], ways)
@@ -142,8 +151,6 @@ def draw(ways: dict[str, Way]) -> Figure:
 
 
 def _against_time(axes: Axes, ways: dict[str, Way]) -> None:
-    from study import style
-
     for k, (name, way) in enumerate(ways.items()):
         axes.semilogy(way.times, way.singular_values, color=style(k)["color"], label=name, linewidth=2)
         axes.plot(way.times[-1], way.singular_values[-1], "X", color=style(k)["color"], markersize=9)
@@ -183,9 +190,9 @@ def _study(command: Sequence[str]) -> None:
             config=suite.episode_config(),
             recorder=TeeRecorder(way, film),
         )
-        films.append((film.times, [picture[:, :_CROP] for picture in film.pictures]))
+        films.append((film.times, [titled(picture[:, :_CROP], name) for picture in film.pictures]))
         print(f"{name}: {way.event}, smallest singular value {result.min_singular_value:.3f}")
-    write_film(options.out.with_suffix(".gif"), films)
+    write_film(options.out.with_suffix(".webp"), films)
     try:
         draw(ways).savefig(options.out.with_suffix(".png"), metadata={"Software": None})
     except OSError as error:
