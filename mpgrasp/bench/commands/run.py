@@ -68,7 +68,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--detector",
         metavar="D[,D]",
         help=f"{', '.join(detector_names())}, or your own as module:Class (default: dhrnet; "
-        "paper: ggcnn2, tfgrasp and dhrnet, with references)",
+        "paper: ggcnn, tfgrasp and dhrnet, with references)",
     )
     add(
         "--controller",

@@ -47,7 +47,7 @@ PROGRAMMES: dict[str, Programme] = {
     "paper": Programme(
         title="The paper's physical trials: Tables III, IV, V and VI",
         suites=("single", "unseen", "thin", "stacked"),
-        detectors=("ggcnn2", "tfgrasp", "dhrnet"),
+        detectors=("ggcnn", "tfgrasp", "dhrnet"),
         controllers=tuple(chain(*map(controllers_of, Baseline))),
         # the ceiling, and the floor: one look and no closed loop
         references=(Method("oracle", "mppc"), Method("dhrnet", "open_loop")),

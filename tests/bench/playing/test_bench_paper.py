@@ -54,7 +54,7 @@ def test_the_paper_is_three_detectors_with_the_controllers_of_its_baselines_a_ce
 ) -> None:
     paper = PROGRAMMES["paper"]
     assert paper.suites == ("single", "unseen", "thin", "stacked")
-    cells = [(d, c) for d in ("ggcnn2", "tfgrasp", "dhrnet") for c in controllers]
+    cells = [(d, c) for d in ("ggcnn", "tfgrasp", "dhrnet") for c in controllers]
     assert [tuple(method) for method in paper.methods(baseline=baseline)] == [
         *cells,
         ("oracle", "mppc"),
