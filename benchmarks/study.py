@@ -222,6 +222,24 @@ def publish(
         raise OutputError(f"results cannot be written: {error}", got=str(out)) from error
 
 
+def begin(out: Path, run: Mapping[str, Any]) -> None:
+    """Write run.json before the first episode is played; `run` has `settings`, which a folder keeps.
+
+    Raises:
+        ConfigError: the folder holds a run of other settings.
+        OutputError: it cannot be written or read.
+    """
+    prepare(out)
+    path = out / "run.json"
+    try:
+        there = json.loads(path.read_text("utf-8")) if path.is_file() else None
+        if there is not None and there["settings"] != json.loads(json.dumps(json_value(run["settings"]))):
+            raise ConfigError("a run of other settings is in the way", got=str(out), allowed="another --out")
+    except (OSError, KeyError, TypeError, json.JSONDecodeError) as error:
+        raise OutputError(f"run.json cannot be read: {error!r}", got=str(path)) from error
+    _write(path, json.dumps(json_value(run), indent=1) + "\n")
+
+
 def prepare(out: Path) -> None:
     """Make the folder of the results, before hours are spent on them.
 

@@ -192,6 +192,11 @@ def blind_drift(run: str, detector: str, controller: str) -> float:
     return float(1e3 * mean(line["blind_drift_m"] for line in cell(run, detector, controller).values()))
 
 
+def drift_in(run: str, detector: str, controller: str, episode: int) -> float:
+    """Return the drift to the side before the first detection in one episode [mm]."""
+    return float(1e3 * cell(run, detector, controller)[episode]["blind_drift_m"])
+
+
 # clearing tables
 
 
@@ -293,3 +298,8 @@ def ordering(suite: str, claim: str) -> float:
 
 def verdicts(verdict: str) -> int:
     return sum(row["verdict"] == verdict for row in orderings().values())
+
+
+def verdicts_in(verdict: str, column: str) -> int | None:
+    """Return the number of orderings with a verdict; None for a baseline that has not been played."""
+    return verdicts(verdict) if column == "older pair" else None

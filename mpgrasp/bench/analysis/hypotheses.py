@@ -3,6 +3,9 @@
 Rates (success, reflex stops) by McNemar's exact test, times and distances by Wilcoxon's signed-rank test;
 all two-sided, and corrected after Holm over all that could be decided. A claim over too few worlds for any p
 below the level of significance is no test, and left out (Tarone, Biometrics 46, 1990).
+
+The claims are about MVP and MP-PC. They are tested for each baseline on its own, the correction included:
+with the controllers as published, and with this project's robust ones.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from enum import StrEnum
 import numpy as np
 
 from mpgrasp.bench.analysis.pairing import pair_worlds
-from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Claim, Measure
+from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Baseline, Claim, Measure
 from mpgrasp.bench.analysis.summary import restricted_time, time_limits
 from mpgrasp.bench.record import Cell, Cells, PlayedLine
 from mpgrasp.statistics import FEWEST_PAIRS, SIGNIFICANCE, holm, mcnemar, wilcoxon
@@ -54,22 +57,26 @@ class Finding:
     """True if the difference has the direction claimed, significant or not."""
 
 
-def cell_of(cells: Cells, suite: str, method: str, controller: str) -> Cell | None:
+def cell_of(
+    cells: Cells, suite: str, method: tuple[str, str], baseline: Baseline = Baseline.PUBLISHED
+) -> Cell | None:
     """The cell of a run that stands for the paper's (detector, controller); None if there is none.
 
     One detector stands for a method throughout a suite: the first of its names that occurs there.
     """
     there = {cell.detector for cell in cells if cell.suite == suite}
-    for detector in METHODS[method]:
+    for detector in METHODS[method[0]]:
         if detector in there:
-            cell = Cell(suite, detector, CONTROLLERS[controller])
+            cell = Cell(suite, detector, CONTROLLERS[baseline][method[1]])
             return cell if cell in cells else None
     return None
 
 
-def evaluate(cells: Cells, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:
-    """One finding per claim, in their order."""
-    findings = [_test(claim, cells) for claim in claims]
+def evaluate(
+    cells: Cells, claims: Sequence[Claim] = CLAIMS, baseline: Baseline = Baseline.PUBLISHED
+) -> list[Finding]:
+    """One finding per claim, in their order, with the controllers of a baseline."""
+    findings = [_test(claim, cells, baseline) for claim in claims]
     tested = [k for k, f in enumerate(findings) if f.verdict not in (Verdict.ABSENT, Verdict.UNDECIDABLE)]
     for k, p in zip(tested, holm([findings[k].p for k in tested]), strict=True):
         found, verdict = findings[k], Verdict.NOT_CONFIRMED
@@ -79,8 +86,8 @@ def evaluate(cells: Cells, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:
     return findings
 
 
-def _test(claim: Claim, cells: Cells) -> Finding:
-    keys = [cell_of(cells, claim.suite, *side) for side in (claim.better, claim.worse)]
+def _test(claim: Claim, cells: Cells, baseline: Baseline) -> Finding:
+    keys = [cell_of(cells, claim.suite, side, baseline) for side in (claim.better, claim.worse)]
     missing = [
         " + ".join(side) for side, key in zip((claim.better, claim.worse), keys, strict=True) if key is None
     ]

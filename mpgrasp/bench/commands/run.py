@@ -17,7 +17,7 @@ examples:
   python -m mpgrasp.bench unseen --detector my_net:MyDetector --weights my_net.pt --record 3
   python -m mpgrasp.bench thin --episodes 50 --until-ci 10
   python -m mpgrasp.bench paper --workers 2
-  python -m mpgrasp.bench paper --suites unseen,thin --episodes 100
+  python -m mpgrasp.bench paper --suites unseen,thin --episodes 100 --baseline published
   python -m mpgrasp.bench thin --set controller.gamma=4/3 --set sensor.subpixel=0.12
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
@@ -40,6 +40,7 @@ exit code: 0 all episodes played, 1 some could not be played, 2 unusable input o
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
+    from mpgrasp.bench.analysis.paper import Baseline
     from mpgrasp.bench.playing.programme import PROGRAMMES
     from mpgrasp.bench.playing.workers import HANG_AFTER
     from mpgrasp.camera.backends import BACKENDS
@@ -67,13 +68,19 @@ def make_parser() -> argparse.ArgumentParser:
         "--detector",
         metavar="D[,D]",
         help=f"{', '.join(detector_names())}, or your own as module:Class (default: dhrnet; "
-        "paper: ggcnn2, tfgrasp and dhrnet, with references)",
+        "paper: ggcnn, tfgrasp and dhrnet, with references)",
     )
     add(
         "--controller",
         metavar="C[,C]",
         help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc; "
-        "paper: mvp and mppc)",
+        "paper: mvp, mppc, mvp_robust and mppc_robust)",
+    )
+    add(
+        "--baseline",
+        choices=tuple(Baseline),
+        help="paper: play the controllers of one baseline alone, published (mvp and mppc) or robust "
+        "(mvp_robust and mppc_robust); (default: both, which takes nearly twice as long)",
     )
     add(
         "--episodes",

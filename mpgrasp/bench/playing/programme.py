@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
+from mpgrasp.bench.analysis.paper import Baseline, controllers_of
 from mpgrasp.bench.playing.plan import every_method
 from mpgrasp.bench.record import Method
 from mpgrasp.exceptions import ConfigError
@@ -24,10 +26,20 @@ class Programme:
     """Played beside every detector with every controller, unless the command line names others."""
 
     def methods(
-        self, detectors: Sequence[str] | None = None, controllers: Sequence[str] | None = None
+        self,
+        detectors: Sequence[str] | None = None,
+        controllers: Sequence[str] | None = None,
+        baseline: Baseline | None = None,
     ) -> tuple[Method, ...]:
-        """The methods that play; detectors or controllers that are given replace all of the programme's."""
-        methods = every_method(detectors or self.detectors, controllers or self.controllers)
+        """The methods that play.
+
+        Args:
+            detectors: in place of the programme's, and without its references; None: the programme's.
+            controllers: likewise.
+            baseline: whose controllers alone play of the programme's; None: all of them.
+        """
+        own = tuple(name for name in self.controllers if baseline is None or name in controllers_of(baseline))
+        methods = every_method(detectors or self.detectors, controllers or own)
         return methods if detectors or controllers else (*methods, *self.references)
 
 
@@ -35,8 +47,8 @@ PROGRAMMES: dict[str, Programme] = {
     "paper": Programme(
         title="The paper's physical trials: Tables III, IV, V and VI",
         suites=("single", "unseen", "thin", "stacked"),
-        detectors=("ggcnn2", "tfgrasp", "dhrnet"),
-        controllers=("mvp", "mppc"),
+        detectors=("ggcnn", "tfgrasp", "dhrnet"),
+        controllers=tuple(chain(*map(controllers_of, Baseline))),
         # the ceiling, and the floor: one look and no closed loop
         references=(Method("oracle", "mppc"), Method("dhrnet", "open_loop")),
     ),

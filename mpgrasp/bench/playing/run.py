@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.playing.crew import Crew, make_crew
 from mpgrasp.bench.playing.description import describe
@@ -51,10 +52,17 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         check_name("controller", name, controller_names())
     only = None if arguments.suites is None else tuple(arguments.suites.split(","))
     suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
+    if arguments.baseline is not None and (programme is None or controllers is not None):
+        raise ConfigError(
+            "--baseline says which controllers of a programme play",
+            got=arguments.baseline,
+            allowed=f"with {', '.join(PROGRAMMES)}, and without --controller",
+        )
     if programme is None:
         methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
     else:
-        methods = programme.methods(detectors, controllers)
+        baseline = None if arguments.baseline is None else Baseline(arguments.baseline)
+        methods = programme.methods(detectors, controllers, baseline)
     suites, objects = _with_objects(suites, arguments)
     suites = with_assignments(suites, arguments.set, noise=not arguments.no_noise)
     detectors, controllers = (tuple(dict.fromkeys(names)) for names in zip(*methods, strict=True))

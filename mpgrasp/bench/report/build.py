@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mpgrasp.bench.analysis.hypotheses import evaluate
+from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.filmstrips import Films, filmstrips
@@ -95,7 +96,7 @@ def make_report(runs: Runs) -> Report:
         by_object=object_tables(evaluation),
         refused_meshes=refused_meshes_table(runs),
         paper=paper_tables(evaluation),
-        orderings=orderings(evaluate(runs.cells)),
+        orderings=orderings({baseline: evaluate(runs.cells, baseline=baseline) for baseline in Baseline}),
         pairs=pair_table(evaluation.tests),
         outcomes={suite: outcome_figures(evaluation, suite) for suite in runs.suites},
         motion=motion_table(evaluation),

@@ -38,4 +38,4 @@ class Evaluation:
 
     def paper_cell(self, suite: str, method: tuple[str, str]) -> Cell | None:
         """The cell that stands for (detector, controller) of the paper; None if there is none."""
-        return cell_of(self.runs.cells, suite, *method)
+        return cell_of(self.runs.cells, suite, method)

@@ -15,3 +15,8 @@ _NAMES = {
 def name_of(method: Method) -> str:
     """A detector and a controller in words."""
     return " + ".join(_NAMES.get(name, name) for name in method)
+
+
+def name_of_controller(name: str) -> str:
+    """A controller in words."""
+    return _NAMES.get(name, name)

@@ -9,7 +9,7 @@ from msgspec.structs import replace as changed
 from toy_runs import lines
 
 from mpgrasp.bench.analysis.hypotheses import Verdict, evaluate
-from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Claim, Measure, reported
+from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Baseline, Claim, Measure, reported
 from mpgrasp.bench.record import by_cell, played
 
 
@@ -98,6 +98,35 @@ def test_reflexes_and_drift_count_less_as_better() -> None:
     unmeasured = lines("1" * 9, controller="mvp", blind_drift_m=None)
     (found,) = evaluate(by_cell([*stopped, *unmeasured]), [claim(Measure.DRIFT)])
     assert found.verdict is Verdict.ABSENT
+
+
+def test_each_baseline_is_tested_with_its_own_controllers() -> None:
+    published = [*lines("1" * 8), *lines("0" * 8, controller="mvp")]
+    robust = [*lines("0" * 8, controller="mppc_robust"), *lines("1" * 8, controller="mvp_robust")]
+    cells = by_cell([*published, *robust])
+    (found,) = evaluate(cells, [claim()])
+    assert found.verdict is Verdict.CONFIRMED
+    (found,) = evaluate(cells, [claim()], Baseline.ROBUST)
+    assert found.verdict is Verdict.CONTRADICTED
+    (found,) = evaluate(by_cell(published), [claim()], Baseline.ROBUST)
+    assert found.absent == "DHRNet + MP-PC and DHRNet + MVP absent"
+
+
+def test_the_correction_is_over_the_claims_of_one_baseline() -> None:
+    alone = [*lines("1" * 8), *lines("0" * 8, controller="mvp")]
+    robust = [*lines("1" * 8, controller="mppc_robust"), *lines("0" * 8, controller="mvp_robust")]
+    for cells in (by_cell(alone), by_cell([*alone, *robust])):
+        (found,) = evaluate(cells, [claim()])
+        assert found.p_holm == found.p
+
+
+def test_gg_cnn2_stands_for_gg_cnn_where_that_was_not_played() -> None:
+    versus = replace(claim(), better=("DHRNet", "MP-PC"), worse=("GG-CNN", "MP-PC"))
+    older = [*lines("1" * 8), *lines("0" * 8, detector="ggcnn2")]
+    (found,) = evaluate(by_cell(older), [versus])
+    assert (found.verdict, found.worse) == (Verdict.CONFIRMED, 0.0)
+    (found,) = evaluate(by_cell([*older, *lines("1" * 8, detector="ggcnn")]), [versus])
+    assert (found.verdict, found.worse) == (Verdict.NOT_CONFIRMED, 1.0)
 
 
 def test_claims_agree_with_the_papers_own_tables() -> None:

@@ -13,6 +13,7 @@ from bench_runs import clearing_row, grasp_row, pick_row, records, stop_row
 from rich.console import Console
 
 from mpgrasp.bench.__main__ import main
+from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import ClearingCounts, summarise, time_limits
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.programme import PROGRAMMES, Programme, load_suites
@@ -41,20 +42,40 @@ def grasp(episode: int = 0) -> Line:
     return line_of(grasp_row(suite="thin", episode=episode, object="usb_stick", sim_time_s=12.0))
 
 
-def test_the_paper_is_six_cells_over_four_suites_with_a_ceiling_and_a_floor() -> None:
+PUBLISHED, ROBUST = ("mvp", "mppc"), ("mvp_robust", "mppc_robust")
+
+
+@pytest.mark.parametrize(
+    ("baseline", "controllers"),
+    [(None, (*PUBLISHED, *ROBUST)), (Baseline.PUBLISHED, PUBLISHED), (Baseline.ROBUST, ROBUST)],
+)
+def test_the_paper_is_three_detectors_with_the_controllers_of_its_baselines_a_ceiling_and_a_floor(
+    baseline: Baseline | None, controllers: tuple[str, ...]
+) -> None:
     paper = PROGRAMMES["paper"]
     assert paper.suites == ("single", "unseen", "thin", "stacked")
-    cells = [(d, c) for d in ("ggcnn2", "tfgrasp", "dhrnet") for c in ("mvp", "mppc")]
-    assert [tuple(method) for method in paper.methods()] == [
+    cells = [(d, c) for d in ("ggcnn", "tfgrasp", "dhrnet") for c in controllers]
+    assert [tuple(method) for method in paper.methods(baseline=baseline)] == [
         *cells,
         ("oracle", "mppc"),
         ("dhrnet", "open_loop"),
     ]
 
 
+@pytest.mark.parametrize("more", [["thin"], ["paper", "--controller", "mppc"]])
+def test_a_baseline_is_refused_where_it_decides_nothing(
+    more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*more, "--baseline", "robust", "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "--baseline" in error
+
+
 def test_who_is_named_plays_instead_of_the_papers_cells() -> None:
     paper = PROGRAMMES["paper"]
-    assert paper.methods(["oracle"]) == (("oracle", "mvp"), ("oracle", "mppc"))
+    assert paper.methods(["oracle"]) == tuple(("oracle", name) for name in (*PUBLISHED, *ROBUST))
+    assert paper.methods(["oracle"], baseline=Baseline.ROBUST) == tuple(("oracle", name) for name in ROBUST)
     assert paper.methods(None, ["mppc"]) == tuple((d, "mppc") for d in paper.detectors)
     assert paper.methods(["a"], ["b"]) == (("a", "b"),)
 
