@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.assignment import Tables, parse_assignments
 from mpgrasp.settings.effects import reason_idle
-from mpgrasp.suite import EPISODE_GROUPS, GROUPS, METHOD_GROUPS, Suite
+from mpgrasp.settings.grid import GridPoint
+from mpgrasp.suite import EPISODE_GROUPS, GROUPS, METHOD_GROUPS, Suite, point_name
 
 _WHERE = "--set {}"
 
@@ -44,20 +46,27 @@ def with_assignments(suites: Sequence[Suite], texts: Sequence[str], *, noise: bo
     return changed
 
 
-def shared_table(suites: Sequence[Suite], group: Literal["detector", "controller"]) -> Mapping[str, Any]:
-    """Return the settings of what plays, which all suites of a run must have in common.
+def at_point(suite: Suite, point: GridPoint, *, noise: bool) -> Suite:
+    """Return a suite as a point of a sweep has it; the name says which.
 
     Raises:
-        ConfigError: suites that differ in them.
+        ConfigError: as `with_assignments`.
     """
-    first, *others = ({"detector": suite.detector, "controller": suite.controller}[group] for suite in suites)
-    if any(table != first for table in others):
-        raise ConfigError(
-            f"suites of one run differ in [{group}]",
-            got=[suite.name for suite in suites],
-            allowed="the same settings of what plays, or a run for each suite",
-        )
-    return first
+    (changed,) = with_assignments((suite,), point.assignments, noise=noise)
+    return replace(changed, name=point_name(suite.name, point.label))
+
+
+def refuse_different_methods(suites: Sequence[Suite]) -> None:
+    """Raise ConfigError where suites of one run have different settings for what plays."""
+    groups: tuple[Literal["detector", "controller"], ...] = ("detector", "controller")
+    for group in groups:
+        first, *others = (getattr(suite, group) for suite in suites)
+        if any(table != first for table in others):
+            raise ConfigError(
+                f"suites of one run differ in [{group}]",
+                got=[suite.name for suite in suites],
+                allowed="the same settings of what plays, or a run for each suite",
+            )
 
 
 def _known(suite: Suite, suites: Sequence[Suite], tables: Tables) -> Tables:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from mpgrasp.exceptions import ConfigError
@@ -15,6 +15,31 @@ from mpgrasp.settings.effects import reason_idle
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
     from mpgrasp.detectors import DetectorConfig
+    from mpgrasp.suite import Suite
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodSettings:
+    """Settings of all that play a suite, by name; who is left out has its own."""
+
+    detectors: Mapping[str, DetectorConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """Config of each detector, or the keyword arguments of a plug-in."""
+    controllers: Mapping[str, ReachConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """The same of each controller."""
+
+    @classmethod
+    def of(
+        cls, suite: Suite, detectors: Sequence[str], controllers: Sequence[str], preset: str | None = None
+    ) -> MethodSettings:
+        """Return the settings that a suite has for these detectors and controllers.
+
+        Raises:
+            ConfigError: as `detector_settings` and `controller_settings`.
+        """
+        return cls(
+            detectors=detector_settings(detectors, suite.detector),
+            controllers=controller_settings(controllers, suite.controller, preset),
+        )
 
 
 def controller_settings(
