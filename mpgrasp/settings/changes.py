@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.assignment import Tables, parse_assignments
-from mpgrasp.settings.effects import reason_idle
-from mpgrasp.settings.grid import GridPoint
+from mpgrasp.settings.effects import leaves, reason_idle
+from mpgrasp.settings.grid import GridPoint, canonical_assignment
 from mpgrasp.suite import EPISODE_GROUPS, GROUPS, METHOD_GROUPS, Suite, point_name
 
 _WHERE = "--set {}"
@@ -29,7 +29,7 @@ def with_assignments(suites: Sequence[Suite], texts: Sequence[str], *, noise: bo
     Raises:
         ConfigError: a setting that is unknown or without effect, or a value that cannot be used.
     """
-    tables = parse_assignments(texts)
+    tables = parse_assignments([f"{setting}={value}" for setting, value in map(canonical_assignment, texts)])
     for group, table in tables.items():
         if group not in GROUPS:
             place = f"--set {group}.{next(iter(table))}"
@@ -39,10 +39,10 @@ def with_assignments(suites: Sequence[Suite], texts: Sequence[str], *, noise: bo
         raise ConfigError(f"{place} has no effect", got="--no-noise", allowed="one of both")
     changed = tuple(suite.with_settings(_known(suite, suites, tables), _WHERE) for suite in suites)
     for group in (group for group in tables if group not in METHOD_GROUPS):
-        for key in tables[group]:
+        for key, value in leaves(tables[group]):
             why = reason_idle(group, key, _configs(changed, group))
             if why is not None:
-                raise ConfigError(f"--set {group}.{key} has no effect: {why}", got=tables[group][key])
+                raise ConfigError(f"--set {group}.{key} has no effect: {why}", got=value)
     return changed
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.json_values import json_value
 from mpgrasp.settings.assignment import parse_value, split_assignment
+from mpgrasp.suite import EPISODE_GROUPS
 
 LIMIT = 1024
 """Largest number of points in a grid: ten settings with two values each."""
@@ -73,7 +74,7 @@ def parse_grid(texts: Sequence[str]) -> Grid:
     """
     found: dict[str, tuple[str, ...]] = {}
     for text in texts:
-        setting, value = split_assignment(text)
+        setting, value = canonical_assignment(text)
         items = tuple(split_values(value))
         if setting in found:
             raise ConfigError(f"--set {setting} is given twice", got=text, allowed="all values in one --set")
@@ -90,6 +91,19 @@ def parse_grid(texts: Sequence[str]) -> Grid:
         raise ConfigError("too many points in the grid of a sweep", got=size, allowed=f"up to {LIMIT}")
     fixed = tuple(f"{setting}={items[0]}" for setting, items in found.items() if len(items) == 1)
     return Grid(axes=axes, fixed=fixed)
+
+
+def canonical_assignment(text: str) -> tuple[str, str]:
+    """Return the setting and the value of an assignment, with one name for each setting.
+
+    `episode.execution.lift` means `execution.lift`, as in a suite.
+
+    Raises:
+        ConfigError: a text that is no assignment.
+    """
+    setting, value = split_assignment(text)
+    inner = setting.removeprefix("episode.")
+    return inner if inner.partition(".")[0] in EPISODE_GROUPS and "." in inner else setting, value
 
 
 def split_values(text: str) -> Iterator[str]:

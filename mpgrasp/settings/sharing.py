@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import from_table
 from mpgrasp.plugins import plug_in_class
-from mpgrasp.settings.effects import reason_idle
+from mpgrasp.settings.effects import leaves, reason_idle
 
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
@@ -115,11 +115,11 @@ def _share(
         base = bases.get(name)
         where = f"setting {group} of {name}"
         result[name] = own if base is None else from_table(type(base), own, where, base)
-    for key in table:
-        takers = [name for name in names if known[name](key)]
-        why = reason_idle(group, key, [result[name] for name in takers if name in bases])
+    for path, value in leaves(table):
+        takers = [name for name in names if known[name](path.partition(".")[0])]
+        why = reason_idle(group, path, [result[name] for name in takers if name in bases])
         if why is not None and all(name in bases for name in takers):
-            raise ConfigError(f"setting {group}.{key} has no effect: {why}", got=table[key])
+            raise ConfigError(f"setting {group}.{path} has no effect: {why}", got=value)
     return result
 
 

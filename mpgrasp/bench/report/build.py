@@ -35,6 +35,7 @@ from mpgrasp.bench.report.thickness import ThinObjects, thin_objects
 from mpgrasp.bench.results.runs import Runs, find_runs
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
+from mpgrasp.suite import base_name
 
 FILES = ("report.html", "report.md")
 DRAWN = 12
@@ -46,6 +47,7 @@ class Report:
     """Everything that a report says; the templates lay it out, in the order of `sections.j2`."""
 
     suites: Sequence[str]
+    """Names without the points of a sweep."""
     counts: str
     """Numbers of what was played, in a sentence."""
     overview: Table
@@ -97,7 +99,7 @@ def make_report(runs: Runs) -> Report:
     drawn = runs.suites if len(runs.suites) <= DRAWN else []
     kept = read_traces(runs) if drawn else NO_TRACES
     return Report(
-        suites=runs.suites,
+        suites=list(dict.fromkeys(map(base_name, runs.suites))),
         counts=_counts_text(evaluation),
         overview=overview_table(evaluation),
         sweeps=sweep_sections(runs),

@@ -66,10 +66,10 @@ def _points(sweep: Sweep, rows: Sequence[PointResult]) -> Table:
             )
             for row in rows
         ],
-        note="The reference has the suite's own values, or is the first point where none has them. Each "
-        "point is tested against it over the same worlds: episodes in which one of both succeeded alone, the exact "
-        "test, * significant after Holm's correction over the table, and the difference of simulated times "
-        "where both succeeded, with its 95 % interval.",
+        note="The reference has the suite's own values or is the first point where none has them. Each other "
+        "point is tested against it over the same worlds: episodes in which one of both alone succeeded, "
+        "McNemar's exact test, * significant after Holm's correction over the table, and the difference of "
+        "simulated times where both succeeded, with its 95 % interval.",
     )  # fmt: skip
 
 
