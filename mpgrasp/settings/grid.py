@@ -81,6 +81,11 @@ def parse_grid(texts: Sequence[str]) -> Grid:
         if not all(items):
             raise ConfigError(f"--set {setting} has an empty value", got=value, allowed=_FORM)
         found[setting] = items
+    for setting in found:
+        whole = next((other for other in found if setting.startswith(f"{other}.")), None)
+        if whole is not None:
+            key = whole.rpartition(".")[2]
+            raise ConfigError(f"--set {setting}: {key} has a value already", got=list(texts), allowed=_FORM)
     several = [setting for setting, items in found.items() if len(items) > 1]
     if not several:
         raise ConfigError("a sweep has no setting with several values", got=list(texts), allowed=_FORM)
@@ -128,11 +133,16 @@ def _axis(setting: str, name: str, texts: tuple[str, ...]) -> Axis:
     values: list[Any] = []
     for text in texts:
         value = parse_value(text, f"--set {setting}")
-        # as in run.json: 0.2/0.15 and 4/3 are one value
-        if any(type(value) is type(known) and json_value(value) == json_value(known) for known in values):
+        # as in run.json: 0.2/0.15 and 4/3 are one value; true is no number
+        if any(_is_same(value, known) for known in values):
             raise ConfigError(f"--set {setting} has a value twice", got=text, allowed="different values")
         values.append(value)
     return Axis(setting=setting, name=name, texts=texts, values=tuple(values))
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    """True for values between which run.json makes no difference."""
+    return isinstance(a, bool) is isinstance(b, bool) and bool(json_value(a) == json_value(b))
 
 
 def _short(setting: str, others: Sequence[str]) -> str:

@@ -107,8 +107,9 @@ def unequal_conditions(
     one, other = before.as_row(), after.as_row()
     found = [changed for key in _SHARED for changed in differences(one[key], other[key], key)]
     ours, theirs = ({part.suite.name: part for part in run.parts} for run in (before, after))
-    for name, other_name in dict.fromkeys(suites):
-        a, b = ours[name], theirs[other_name]
+    couples = dict.fromkeys((name, to) for name, to in suites if name in ours and to in theirs)
+    for name, to in couples:
+        a, b = ours[name], theirs[to]
         settings = list(differences(*_common_settings(a.settings, b.settings), name))
         found += settings or list(differences(_declared(a, b), _declared(b, a), name))[:1]
     return found
@@ -226,7 +227,8 @@ def _table(rows: Sequence[Comparison]) -> Table:
     for row in rows:
         found = row.pairing
         table.add_row(
-            escape(row.a.suite), str(row.a.method), str(row.b.method), str(found.n),
+            escape(" / ".join(dict.fromkeys((row.a.suite, row.b.suite)))),
+            str(row.a.method), str(row.b.method), str(found.n),
             *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
             _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
             _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),
