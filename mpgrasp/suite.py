@@ -10,6 +10,7 @@ benchmarks/README.md explains the format to users.
 
 from __future__ import annotations
 
+import re
 import tomllib
 import zlib
 from collections.abc import Mapping
@@ -41,6 +42,7 @@ METHOD_GROUPS = ("controller", "detector")
 """Groups of settings that belong to what plays."""
 GROUPS = ("scene", "episode", *EPISODE_GROUPS, *METHOD_GROUPS)
 """Groups of settings, each a table of a suite."""
+_POINT = re.compile(r"(.+?)\[.+=.+\]")
 CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
 """Settings of an episode that no suite decides, and what decides them."""
 
@@ -251,15 +253,27 @@ def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:
     return {**scene, "objects": made}
 
 
+def point_name(suite: str, label: str) -> str:
+    """Return the name of a suite at a point of a sweep: "thin[gamma=8]" for "thin" and "gamma=8"."""
+    return f"{suite}[{label}]"
+
+
+def base_name(suite: str) -> str:
+    """Return the name of a suite without the point of a sweep: "thin" for "thin[gamma=8]" and for "thin"."""
+    point = _POINT.fullmatch(suite)
+    return point[1] if point else suite
+
+
 def episode_seed(suite: str, seed: int, episode: int) -> int:
     """Return the seed of one episode.
 
-    It depends on the suite's name, the run's seed and the episode alone. Scene, sensor noise and start pose
+    It depends on the suite's name, the run's seed and the episode alone; the points of a sweep have the
+    worlds of their suite. Scene, sensor noise and start pose
     follow from it, so that every detector and every controller meets the same worlds, and two suites never
     share one. It is 32 bits, the first word of numpy's SeedSequence over (crc32 of the suite's name, seed,
     episode).
     """
     if seed < 0 or episode < 0:
         raise ConfigError("negative seed or episode", got=(seed, episode), allowed="0, 1, 2, ...")
-    entropy = [zlib.crc32(suite.encode()), seed, episode]
+    entropy = [zlib.crc32(base_name(suite).encode()), seed, episode]
     return int(np.random.SeedSequence(entropy).generate_state(1)[0])

@@ -1,4 +1,4 @@
-"""The benchmark's command line: `python -m mpgrasp.bench SUITE ...`, and commands that play nothing."""
+"""The benchmark's command line: `python -m mpgrasp.bench SUITE ...`, and other commands."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from mpgrasp.bench.commands.run import parse
 from mpgrasp.command_line import run_command
 
-SUBCOMMANDS = ("compare", "replay", "report", "settings")
-"""Words in the place of SUITE that play nothing, each in its own module."""
+SUBCOMMANDS = ("compare", "replay", "report", "settings", "sweep")
+"""Words in the place of SUITE, each in its own module."""
 
 
 def main(command: Sequence[str] | None = None) -> int:

@@ -7,6 +7,7 @@ one or a value of another type is an error. benchmarks/README.md explains them t
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
@@ -15,11 +16,15 @@ import msgspec
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.json_values import json_value, one_line
 from mpgrasp.outcome import Outcome
+from mpgrasp.suite import base_name
 
 ERROR: Final = "error"
 """`outcome` of an episode that could not be played: it is no failure of a grasp, and is counted apart."""
 
 Row = TypeVar("Row", bound="Record")
+
+
+_LONGEST = 80  # characters of a point of a sweep in the name of a file
 
 
 class Method(NamedTuple):
@@ -66,11 +71,18 @@ class Task(NamedTuple):
     @property
     def stem(self) -> str:
         """File name, without ending, of what is recorded of this episode."""
-        name = f"{self.suite}-{self.detector}-{self.controller}-{self.episode:04d}"
-        return re.sub(r"[^A-Za-z0-9._-]+", "-", name)
+        suite = self.suite
+        if suite != base_name(suite):  # points that differ in what no file name has, and long ones
+            suite = f"{_in_files(suite)[:_LONGEST]}-{zlib.crc32(suite.encode()):08x}"
+        return _in_files(f"{suite}-{self.detector}-{self.controller}-{self.episode:04d}")
 
     def __str__(self) -> str:
         return f"episode {self.episode} of {self.suite} ({self.detector}, {self.controller})"
+
+
+def _in_files(name: str) -> str:
+    """Return a name without what makes trouble in the name of a file."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name)
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

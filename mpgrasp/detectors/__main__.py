@@ -19,6 +19,7 @@ _EPILOG = """\
 examples:
   python -m mpgrasp.detectors show dhrnet --suite thin --seed 3 --height 0.5 --out thin.png
   python -m mpgrasp.detectors show ggcnn2,dhrnet,oracle --suite unseen --above-object --height 0.2
+  python -m mpgrasp.detectors show ggcnn2 --set detector.quality_sigma=0 --set sensor.subpixel=0.2
   python -m mpgrasp.detectors show my_net:MyDetector --weights my_net.pt
   python -m mpgrasp.detectors check dhrnet --runtime openvino --frames 100
   python -m mpgrasp.detectors card dhrnet --weights out/dhrnet.safetensors
@@ -74,6 +75,14 @@ def make_parser() -> argparse.ArgumentParser:
     add("--weights", metavar="[D=]FILE", action="append", default=[], help="in place of the shipped ones")
     add("--camera", metavar="auto|gl|ray", default="auto", help="depth camera's backend (default: auto)")
     add("--no-noise", action="store_true", help="a perfect depth camera")
+    add(
+        "--set",
+        metavar="GROUP.KEY=VALUE",
+        action="append",
+        default=[],
+        help="change a setting of the detectors, the sensor, the camera or the scene, as for a run of the "
+        "benchmark; may be given several times",
+    )
     add("--runtime", metavar=_RUNTIMES, default="auto", help="what computes networks (default: auto)")
     check = commands.add_parser(
         "check", help="compare a network's grasps in a runtime with those in plain torch", allow_abbrev=False

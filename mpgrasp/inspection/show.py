@@ -13,8 +13,13 @@ from mpgrasp.inspection.pictures import side_by_side
 from mpgrasp.inspection.viewpoint import Viewpoint, look
 from mpgrasp.plugins import load_detector, parse_weights
 from mpgrasp.recording.recorder import claim_file
+from mpgrasp.settings.changes import with_assignments
+from mpgrasp.settings.grid import canonical_assignment
 from mpgrasp.settings.sharing import detector_settings
-from mpgrasp.suite import load_suite
+from mpgrasp.suite import Suite, load_suite
+
+GROUPS = ("scene", "sensor", "camera", "detector")
+"""Groups of settings that a single look depends on."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -22,8 +27,9 @@ def run(options: argparse.Namespace) -> int:
     names = options.detector.split(",")
     if not all(names) or len(set(names)) < len(names):
         raise ConfigError("unusable list of detectors", got=options.detector, allowed="different detectors")
+    suite = _suite(options)
     viewpoint = Viewpoint(
-        suite=options.suite,
+        suite=suite,
         seed=options.seed,
         episode=options.episode,
         height=options.height,
@@ -32,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         noise=not options.no_noise,
     )
     weights = parse_weights(options.weights, names)
-    settings = detector_settings(names, load_suite(options.suite).detector)
+    settings = detector_settings(names, suite.detector)
     detectors = {
         name: load_detector(name, weights.get(name), options.runtime, settings[name]) for name in names
     }
@@ -50,3 +56,13 @@ def run(options: argparse.Namespace) -> int:
         print(f"{name}: {', '.join(rest).replace(',  ', ', ')}; first call {shown.first_milliseconds:.0f} ms")
     print(f"Picture: {options.out}")
     return 0
+
+
+def _suite(options: argparse.Namespace) -> Suite:
+    """The suite with what `--set` changes of it."""
+    for text in options.set:
+        setting, value = canonical_assignment(text)
+        if setting.partition(".")[0] not in GROUPS:
+            raise ConfigError(f"--set {setting} has no effect on a single look", got=value, allowed=GROUPS)
+    (suite,) = with_assignments((load_suite(options.suite),), options.set, noise=not options.no_noise)
+    return suite

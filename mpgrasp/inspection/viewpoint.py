@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
 from mpgrasp.inspection.pictures import Prediction
-from mpgrasp.suite import episode_seed, load_suite
+from mpgrasp.suite import Suite, episode_seed, load_suite
 
 _REPEATS = 5  # predictions that are timed once a detector is warm
 _MAX_HEIGHT = 1.0  # [m]
@@ -25,7 +25,7 @@ _MAX_HEIGHT = 1.0  # [m]
 class Viewpoint:
     """Place of the camera: in an episode of a suite, looking straight down."""
 
-    suite: str = "thin"
+    suite: Suite = field(default_factory=lambda: load_suite("thin"))
     seed: int = 0
     """Seed of the benchmark run."""
     episode: int = 0
@@ -47,17 +47,17 @@ class Viewpoint:
 
     def caption(self) -> list[str]:
         """Return four short lines that name the place."""
-        return [self.suite, f"seed {self.seed}", f"episode {self.episode}", f"tool at {self.height:g} m"]
+        return [self.suite.name, f"seed {self.seed}", f"episode {self.episode}", f"tool at {self.height:g} m"]
 
 
 def look(viewpoint: Viewpoint, detectors: Mapping[str, GraspDetector]) -> tuple[DepthFrame, list[Prediction]]:
     """Return the frame of an episode's first look from there, and what each detector makes of it.
 
     Raises:
-        ConfigError: a suite, object or height that cannot be used.
+        ConfigError: an object or height that cannot be used.
         CameraError: a camera backend that this machine does not have.
     """
-    suite = load_suite(viewpoint.suite)
+    suite = viewpoint.suite
     seed = episode_seed(suite.name, viewpoint.seed, viewpoint.episode)
     config = replace(
         suite.episode_config(camera=viewpoint.camera, noise=viewpoint.noise), start_height=viewpoint.height

@@ -34,17 +34,28 @@ def parse_assignments(texts: Sequence[str]) -> Tables:
     """
     tables: Tables = {}
     for text in texts:
-        path, separator, value = text.partition("=")
-        keys = [key.strip() for key in path.split(".")]
-        if not separator or len(keys) < 2 or not all(keys):
-            raise ConfigError("unusable --set", got=text, allowed=_FORM)
+        setting, value = split_assignment(text)
+        *tables_above, last = setting.split(".")
         place: dict[str, Any] = tables
-        for key in keys[:-1]:
+        for key in tables_above:
             place = place.setdefault(key, {})
             if not isinstance(place, dict):
-                raise ConfigError(f"--set {path}: {key} has a value already", got=text, allowed=_FORM)
-        place[keys[-1]] = parse_value(value.strip(), f"--set {path}")
+                raise ConfigError(f"--set {setting}: {key} has a value already", got=text, allowed=_FORM)
+        place[last] = parse_value(value, f"--set {setting}")
     return tables
+
+
+def split_assignment(text: str) -> tuple[str, str]:
+    """Return the setting and the value of an assignment, as texts without blanks around them.
+
+    Raises:
+        ConfigError: a text that is no assignment.
+    """
+    path, separator, value = text.partition("=")
+    keys = [key.strip() for key in path.split(".")]
+    if not separator or len(keys) < 2 or not all(keys):
+        raise ConfigError("unusable --set", got=text, allowed=_FORM)
+    return ".".join(keys), value.strip()
 
 
 def parse_value(text: str, where: str) -> Any:

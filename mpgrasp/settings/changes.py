@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.assignment import Tables, parse_assignments
-from mpgrasp.settings.effects import reason_idle
-from mpgrasp.suite import EPISODE_GROUPS, GROUPS, METHOD_GROUPS, Suite
+from mpgrasp.settings.effects import leaves, reason_idle
+from mpgrasp.settings.grid import GridPoint, canonical_assignment
+from mpgrasp.suite import EPISODE_GROUPS, GROUPS, METHOD_GROUPS, Suite, point_name
 
 _WHERE = "--set {}"
 
@@ -27,7 +29,7 @@ def with_assignments(suites: Sequence[Suite], texts: Sequence[str], *, noise: bo
     Raises:
         ConfigError: a setting that is unknown or without effect, or a value that cannot be used.
     """
-    tables = parse_assignments(texts)
+    tables = parse_assignments([f"{setting}={value}" for setting, value in map(canonical_assignment, texts)])
     for group, table in tables.items():
         if group not in GROUPS:
             place = f"--set {group}.{next(iter(table))}"
@@ -37,27 +39,34 @@ def with_assignments(suites: Sequence[Suite], texts: Sequence[str], *, noise: bo
         raise ConfigError(f"{place} has no effect", got="--no-noise", allowed="one of both")
     changed = tuple(suite.with_settings(_known(suite, suites, tables), _WHERE) for suite in suites)
     for group in (group for group in tables if group not in METHOD_GROUPS):
-        for key in tables[group]:
+        for key, value in leaves(tables[group]):
             why = reason_idle(group, key, _configs(changed, group))
             if why is not None:
-                raise ConfigError(f"--set {group}.{key} has no effect: {why}", got=tables[group][key])
+                raise ConfigError(f"--set {group}.{key} has no effect: {why}", got=value)
     return changed
 
 
-def shared_table(suites: Sequence[Suite], group: Literal["detector", "controller"]) -> Mapping[str, Any]:
-    """Return the settings of what plays, which all suites of a run must have in common.
+def at_point(suite: Suite, point: GridPoint, *, noise: bool) -> Suite:
+    """Return a suite as a point of a sweep has it; the name says which.
 
     Raises:
-        ConfigError: suites that differ in them.
+        ConfigError: as `with_assignments`.
     """
-    first, *others = ({"detector": suite.detector, "controller": suite.controller}[group] for suite in suites)
-    if any(table != first for table in others):
-        raise ConfigError(
-            f"suites of one run differ in [{group}]",
-            got=[suite.name for suite in suites],
-            allowed="the same settings of what plays, or a run for each suite",
-        )
-    return first
+    (changed,) = with_assignments((suite,), point.assignments, noise=noise)
+    return replace(changed, name=point_name(suite.name, point.label))
+
+
+def refuse_different_methods(suites: Sequence[Suite]) -> None:
+    """Raise ConfigError where suites of one run have different settings for what plays."""
+    groups: tuple[Literal["detector", "controller"], ...] = ("detector", "controller")
+    for group in groups:
+        first, *others = (getattr(suite, group) for suite in suites)
+        if any(table != first for table in others):
+            raise ConfigError(
+                f"suites of one run differ in [{group}]",
+                got=[suite.name for suite in suites],
+                allowed="the same settings of what plays, or a run for each suite",
+            )
 
 
 def _known(suite: Suite, suites: Sequence[Suite], tables: Tables) -> Tables:

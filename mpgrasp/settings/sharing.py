@@ -4,17 +4,42 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import from_table
 from mpgrasp.plugins import plug_in_class
-from mpgrasp.settings.effects import reason_idle
+from mpgrasp.settings.effects import leaves, reason_idle
 
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
     from mpgrasp.detectors import DetectorConfig
+    from mpgrasp.suite import Suite
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodSettings:
+    """Settings of all that play a suite, by name; who is left out has its own."""
+
+    detectors: Mapping[str, DetectorConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """Config of each detector, or the keyword arguments of a plug-in."""
+    controllers: Mapping[str, ReachConfig | Mapping[str, Any]] = field(default_factory=dict)
+    """The same of each controller."""
+
+    @classmethod
+    def of(
+        cls, suite: Suite, detectors: Sequence[str], controllers: Sequence[str], preset: str | None = None
+    ) -> MethodSettings:
+        """Return the settings that a suite has for these detectors and controllers.
+
+        Raises:
+            ConfigError: as `detector_settings` and `controller_settings`.
+        """
+        return cls(
+            detectors=detector_settings(detectors, suite.detector),
+            controllers=controller_settings(controllers, suite.controller, preset),
+        )
 
 
 def controller_settings(
@@ -90,11 +115,11 @@ def _share(
         base = bases.get(name)
         where = f"setting {group} of {name}"
         result[name] = own if base is None else from_table(type(base), own, where, base)
-    for key in table:
-        takers = [name for name in names if known[name](key)]
-        why = reason_idle(group, key, [result[name] for name in takers if name in bases])
+    for path, value in leaves(table):
+        takers = [name for name in names if known[name](path.partition(".")[0])]
+        why = reason_idle(group, path, [result[name] for name in takers if name in bases])
         if why is not None and all(name in bases for name in takers):
-            raise ConfigError(f"setting {group}.{key} has no effect: {why}", got=table[key])
+            raise ConfigError(f"setting {group}.{path} has no effect: {why}", got=value)
     return result
 
 

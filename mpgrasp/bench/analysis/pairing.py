@@ -11,12 +11,14 @@ import numpy as np
 from mpgrasp.bench.record import ErrorLine, Line, PlayedLine, played
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.statistics import mcnemar, mean_interval
+from mpgrasp.suite import base_name
 
 
 class World(NamedTuple):
     """One scene with its start pose and sensor noise, which every detector and controller meets alike."""
 
     suite: str
+    """Name without the point of a sweep."""
     seed: int
     episode: int
 
@@ -118,4 +120,4 @@ def _by_world(lines: Iterable[Line]) -> dict[World, PlayedLine]:
 
 
 def _world(line: Line) -> World:
-    return World(line.suite, line.seed, line.episode)
+    return World(base_name(line.suite), line.seed, line.episode)

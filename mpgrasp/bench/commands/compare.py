@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
 
 from mpgrasp.bench.analysis.pairing import Pairing, pair, pair_worlds
@@ -21,7 +22,7 @@ from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.json_values import Difference, differences
 from mpgrasp.statistics import SIGNIFICANCE, holm, restricted, wilcoxon
-from mpgrasp.suite import METHOD_GROUPS
+from mpgrasp.suite import METHOD_GROUPS, base_name
 
 EXIT_WORSE = 1
 _SHARED = ("seed", "camera", "noise")
@@ -93,13 +94,22 @@ class Comparison:
         return found
 
 
-def unequal_conditions(before: Configuration, after: Configuration) -> list[Difference]:
-    """Differences of two configurations in what decides the worlds and the episodes that both played."""
+def unequal_conditions(
+    before: Configuration, after: Configuration, suites: Iterable[tuple[str, str]]
+) -> list[Difference]:
+    """Differences of two configurations in what decides the worlds and the episodes that both played.
+
+    Args:
+        before: configuration of A.
+        after: configuration of B.
+        suites: that are compared, one of A with one of B.
+    """
     one, other = before.as_row(), after.as_row()
     found = [changed for key in _SHARED for changed in differences(one[key], other[key], key)]
     ours, theirs = ({part.suite.name: part for part in run.parts} for run in (before, after))
-    for name in (name for name in ours if name in theirs):
-        a, b = ours[name], theirs[name]
+    couples = dict.fromkeys((name, to) for name, to in suites if name in ours and to in theirs)
+    for name, to in couples:
+        a, b = ours[name], theirs[to]
         settings = list(differences(*_common_settings(a.settings, b.settings), name))
         found += settings or list(differences(_declared(a, b), _declared(b, a), name))[:1]
     return found
@@ -120,6 +130,7 @@ def _common_settings(a: Card, b: Card) -> tuple[Card, Card]:
 def _declared(part: SuitePart, other: SuitePart) -> Card:
     """Declaration of a suite without what it has for what plays, and what both runs keep of its episodes."""
     suite = {key: value for key, value in part.suite.as_row().items() if key not in METHOD_GROUPS}
+    suite["name"] = base_name(part.suite.name)
     shared = [key for key in part.episode if key in other.episode and key not in _SHARED]
     return {"suite": suite, "episode": {key: part.episode[key] for key in shared}}
 
@@ -183,7 +194,8 @@ def main(command: Sequence[str]) -> int:
     rows = compare(a, b)
     print(f"A = {folder_a}\nB = {folder_b}")
     before, after = (read_run(folder) for folder in (folder_a, folder_b))
-    for changed in unequal_conditions(before.configuration, after.configuration):
+    suites = [(row.a.suite, row.b.suite) for row in rows]
+    for changed in unequal_conditions(before.configuration, after.configuration, suites):
         print(f"Not the same in both: {changed.words('in A', 'in B')}")
     for changed in differences(before.made_with.as_row(), after.made_with.as_row()):
         print(f"Not made with the same: {changed.words('in A', 'in B')}")
@@ -215,7 +227,8 @@ def _table(rows: Sequence[Comparison]) -> Table:
     for row in rows:
         found = row.pairing
         table.add_row(
-            row.a.suite, str(row.a.method), str(row.b.method), str(found.n),
+            escape(" / ".join(dict.fromkeys((row.a.suite, row.b.suite)))),
+            str(row.a.method), str(row.b.method), str(found.n),
             *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
             _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
             _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),

@@ -66,9 +66,9 @@ def main(command: Sequence[str]) -> int:
     """
     from mpgrasp.bench.commands.run import make_parser as run_parser
     from mpgrasp.bench.playing.description import configuration
+    from mpgrasp.bench.playing.planning import make_plan
     from mpgrasp.bench.playing.player import Player
     from mpgrasp.bench.playing.recorded_command import recorded_arguments
-    from mpgrasp.bench.playing.run import make_plan
     from mpgrasp.bench.results.provenance import provenance
     from mpgrasp.bench.results.reader import read_run
 

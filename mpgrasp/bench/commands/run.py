@@ -19,11 +19,13 @@ examples:
   python -m mpgrasp.bench paper --workers 2
   python -m mpgrasp.bench paper --suites unseen,thin --episodes 100 --baseline published
   python -m mpgrasp.bench thin --set controller.gamma=4/3 --set sensor.subpixel=0.12
+  python -m mpgrasp.bench sweep thin --set controller.gamma=0,4/3,8 --set controller.alpha=0.2,1
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
   python -m mpgrasp.bench settings thin              (see settings --help)
+  python -m mpgrasp.bench sweep thin --set ...       (see sweep --help)
 
 Every detector and every controller meets the same scenes, sensor noise and start poses. The same
 command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
@@ -172,6 +174,7 @@ def make_parser() -> argparse.ArgumentParser:
         f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )
     add("--quiet", action="store_true", help="no progress, only the table")
+    parser.set_defaults(sweep=False)
     return parser
 
 
@@ -192,14 +195,18 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def parse(command: Sequence[str]) -> argparse.Namespace:
+def parse(command: Sequence[str], parser: argparse.ArgumentParser | None = None) -> argparse.Namespace:
     """Arguments of a run, those of a resumed one taken from its run.json.
+
+    Args:
+        command: words after the program, and after `sweep` where that is one.
+        parser: of these words; that of a run unless given.
 
     Raises:
         ConfigError: unusable arguments, or a file of the resumed run that is not there any more.
         OutputError: nothing to resume.
     """
-    parser = make_parser()
+    parser = parser or make_parser()
     arguments = parser.parse_args(command)
     if arguments.resume is None:
         if arguments.suite is None:

@@ -62,7 +62,7 @@ def main(command: Sequence[str]) -> int:
         ConfigError: input that cannot be used.
     """
     from mpgrasp.bench.commands.run import make_parser as run_parser
-    from mpgrasp.bench.playing.run import make_plan
+    from mpgrasp.bench.playing.planning import make_plan
 
     given = vars(make_parser().parse_args(command))
     arguments = run_parser().parse_args([given["suite"]])
@@ -85,10 +85,11 @@ def sections(plan: Plan, suite: Suite) -> Iterator[tuple[str, list[Row]]]:
         changed = {key: value for key, value in vars(scene).items() if value != getattr(first, key)}
         yield f"[scene] of {suite.name}, turn {turn}", list(_rows("scene", scene, changed))
     config = suite.episode_config(camera=plan.camera, noise=plan.noise)
-    groups = tree(config, plan.controller_settings, plan.detector_settings)
+    played = plan.settings_of(suite.name)
+    groups = tree(config, played.controllers, played.detectors)
     groups["episode"] = {key: value for key, value in groups["episode"].items() if key not in CALLERS}
     for name, settings in groups.pop("controller").items():
-        yield f"[controller] of {name}", list(_rows("controller", plan.controller_settings[name], settings))
+        yield f"[controller] of {name}", list(_rows("controller", played.controllers[name], settings))
     for name, settings in groups.pop("detector").items():
         yield f"[detector] of {name}", list(_rows("detector", settings, settings))
     for group, settings in groups.items():

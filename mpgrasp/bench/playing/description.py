@@ -22,6 +22,7 @@ from mpgrasp.bench.results.run_card import (
     RunDescription,
     SuiteCard,
     SuitePart,
+    WorldCard,
 )
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.files.json_values import json_value
@@ -38,10 +39,19 @@ def describe(plan: Plan, player: Player, command: Sequence[str]) -> RunDescripti
     from mpgrasp.bench.playing.world_card import world_card
     from mpgrasp.bench.results.provenance import provenance
 
-    worlds = {
-        suite.name: world_card(suite, player.episode_configs[suite.name], plan.seed) for suite in plan.suites
-    }
+    worlds: dict[str, WorldCard] = {}
+    known: list[tuple[Any, WorldCard]] = []  # points of a sweep may share a world
+    for suite in plan.suites:
+        config = player.episode_configs[suite.name]
+        decided_by = suite_card(suite).scenes, json_value(config)
+        like = next((card for place, card in known if place == decided_by), None)
+        if like is None:
+            like = world_card(suite, config, plan.seed)
+            known.append((decided_by, like))
+        worlds[suite.name] = like
     first = worlds[plan.suites[0].name]
+    if plan.sweep:
+        worlds = {name: card for name, card in worlds.items() if card != first}
     return RunDescription(
         format=1,
         command=shlex.join([*PROGRAM, *command]),
@@ -69,6 +79,7 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         settings=parts[0].settings if alone else {},
         suite=plan.programme or parts[0].suite,
         suites=() if alone else parts,
+        sweep=plan.sweep,
         episode=parts[0].episode if alone else None,
         episodes=parts[0].episodes if alone else None,
         cells=tuple(str(method) for method in plan.methods),
@@ -93,7 +104,8 @@ def _part(plan: Plan, suite: Suite, player: Player) -> SuitePart:
     """One suite as it is played: its episodes' own settings, and the tree of all."""
     card, config = suite_card(suite), player.episode_configs[suite.name]
     scenes = card.scenes[0] if len(card.scenes) == 1 else list(card.scenes)
-    groups = json_value(tree(config, plan.controller_settings, plan.detector_settings))
+    played = plan.settings_of(suite.name)
+    groups = json_value(tree(config, played.controllers, played.detectors))
     episode = {key: value for key, value in json_value(config).items() if key not in WORLD_GROUPS}
     return SuitePart(
         settings={"scene": scenes, **groups}, suite=card, episode=episode, episodes=plan.batch(suite)

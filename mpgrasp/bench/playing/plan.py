@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Method, Task
 from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.settings.sharing import MethodSettings
 from mpgrasp.suite import Suite
 
 if TYPE_CHECKING:
     from mpgrasp.bench.meshes.check import MeshVerdict
-    from mpgrasp.controllers.config import ReachConfig
-    from mpgrasp.detectors import DetectorConfig
 
 
 def every_method(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[Method, ...]:
@@ -38,15 +38,15 @@ class Plan:
     suites: tuple[Suite, ...]
     """Played one after the other, by the same methods."""
     programme: str | None = None
-    """Name of what the suites are played for, where it is more than one suite."""
+    """Name of what the suites are played for: of a programme, or of the suite that is swept."""
     methods: tuple[Method, ...] = (Method("dhrnet", "mppc"),)
     """In the order of their turns."""
     weights: Mapping[str, Path] = field(default_factory=dict)
     """Weights files by detector; the others take what ships with mpgrasp."""
-    detector_settings: Mapping[str, DetectorConfig | Mapping[str, Any]] = field(default_factory=dict)
-    """Config of each detector by name, or the keyword arguments of a plug-in; the others have their own."""
-    controller_settings: Mapping[str, ReachConfig | Mapping[str, Any]] = field(default_factory=dict)
-    """The same of each controller."""
+    settings: Mapping[str, MethodSettings] = field(default_factory=dict)
+    """Settings of what plays, by suite; in the others everybody has its own."""
+    sweep: Sweep | None = None
+    """Grid whose points are the suites; None for a run that is no sweep."""
     runtime: str = "auto"
     """Engine that computes the networks: auto, torch or openvino."""
     objects: tuple[MeshVerdict, ...] = ()
@@ -106,6 +106,10 @@ class Plan:
     def suite(self, name: str) -> Suite:
         """The suite of that name, which must be one of the plan's."""
         return next(suite for suite in self.suites if suite.name == name)
+
+    def settings_of(self, suite: str) -> MethodSettings:
+        """Settings of what plays in a suite."""
+        return self.settings.get(suite, MethodSettings())
 
     def batch(self, suite: Suite) -> int:
         """Episodes of each cell in a suite; with `until_ci` those that are added at a time."""

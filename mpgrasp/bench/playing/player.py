@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from mpgrasp.bench.playing.cast import Cast
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.trace_recorder import TraceRecorder
 from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
-from mpgrasp.plugins import load_controller, load_detector
 from mpgrasp.recording.recorder import NullRecorder, Recorder
 from mpgrasp.suite import episode_seed
 
@@ -26,7 +26,7 @@ class EpisodeError(MpgraspError):
 
 
 class Player:
-    """Plays episodes one at a time with detectors and controllers that are made once.
+    """Plays episodes one at a time with detectors and controllers that are made once for their settings.
 
     Raises:
         ConfigError, WeightsError: a detector, controller or setting that cannot be used.
@@ -34,13 +34,13 @@ class Player:
 
     def __init__(self, plan: Plan, run_episode: Games | None = None) -> None:
         self.plan = plan
-        self.detectors = {
-            name: load_detector(name, plan.weights.get(name), plan.runtime, plan.detector_settings.get(name))
-            for name in plan.detectors
-        }
+        self._cast = Cast(plan)
+        self.detectors = {name: self._cast.detector(name, plan.suites[0].name) for name in plan.detectors}
+        """Those that play the first suite, by name."""
         self.controllers = {
-            name: load_controller(name, plan.controller_settings.get(name)) for name in plan.controllers
+            name: self._cast.controller(name, plan.suites[0].name) for name in plan.controllers
         }
+        """The same of the controllers."""
         self.episode_configs = {
             suite.name: suite.episode_config(camera=plan.camera, noise=plan.noise) for suite in plan.suites
         }
@@ -50,10 +50,12 @@ class Player:
         """Have networks compiled now, once for all workers; a line for people of each that was.
 
         Raises:
-            ConfigError: a detector reads colour, and the camera has none.
+            ConfigError: settings of a later suite that a plug-in refuses, or a detector that reads colour
+                with a camera that has none.
         """
         from mpgrasp.camera.wrist_camera import has_colour
 
+        self._cast.rehearse()
         for name, detector in self.detectors.items():
             if reads_colour(detector) and not has_colour(self.plan.camera):
                 raise ConfigError(
@@ -74,8 +76,8 @@ class Player:
             result = run_episode(
                 suite.scene_config(task.episode),
                 episode_seed(suite.name, self.plan.seed, task.episode),
-                detector=self.detectors[task.detector],
-                controller=self.controllers[task.controller],
+                detector=self._cast.detector(task.detector, task.suite),
+                controller=self._cast.controller(task.controller, task.suite),
                 config=self.episode_configs[suite.name],
                 recorder=self._recorder(task, trace),
             )

@@ -18,6 +18,8 @@ from mpgrasp.exceptions import ConfigError, OutputError
 
 PROGRAM = ("python", "-m", "mpgrasp.bench")
 """First words of a recorded command."""
+SWEEP = "sweep"
+"""Word before the suite that makes a run a sweep."""
 
 
 def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str] = ()) -> Namespace:
@@ -34,8 +36,11 @@ def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str]
         OutputError: no run there, or it does not say by which command it was made.
     """
     words = _command_of(read_run(folder), folder)
+    swept = words[:1] == [SWEEP]
+    words = words[swept:]
     before, added = parser.parse_args(words), parser.parse_args(more)
     arguments = parser.parse_args([*words, *more])
+    arguments.sweep = swept
     if arguments.suite is None:
         raise _no_command(folder)
     if arguments.suite.endswith(".toml"):

@@ -5,111 +5,24 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from datetime import datetime
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.playing.crew import Crew, make_crew
 from mpgrasp.bench.playing.description import describe
-from mpgrasp.bench.playing.plan import Plan, every_method
+from mpgrasp.bench.playing.plan import Plan
+from mpgrasp.bench.playing.planning import make_plan
 from mpgrasp.bench.playing.player import EpisodeError, Player
-from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.processes import interrupts_wait
 from mpgrasp.bench.record import Line, Task, played
-from mpgrasp.bench.report.terminal import RunProgress, print_table, print_tests
+from mpgrasp.bench.report.sweep import sweep_table
+from mpgrasp.bench.report.terminal import RunProgress, print_report_table, print_table, print_tests
 from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
 from mpgrasp.exceptions import ConfigError, OutputError
-from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
-from mpgrasp.settings.changes import shared_table, with_assignments
-from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite
 
-if TYPE_CHECKING:
-    from mpgrasp.bench.meshes.check import MeshVerdict
-
 EXIT_BROKEN = 1
-DETECTOR, CONTROLLER = "dhrnet", "mppc"
-"""The method that plays a suite unless told otherwise."""
-
-
-def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
-    """The plan of a command line and the folder of its results.
-
-    Raises:
-        ConfigError: input that cannot be used.
-    """
-    detectors, controllers = (
-        None if names is None else tuple(names.split(","))
-        for names in (arguments.detector, arguments.controller)
-    )
-    for name in detectors or ():
-        check_name("detector", name, detector_names())
-    for name in controllers or ():
-        check_name("controller", name, controller_names())
-    only = None if arguments.suites is None else tuple(arguments.suites.split(","))
-    suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
-    if arguments.baseline is not None and (programme is None or controllers is not None):
-        raise ConfigError(
-            "--baseline says which controllers of a programme play",
-            got=arguments.baseline,
-            allowed=f"with {', '.join(PROGRAMMES)}, and without --controller",
-        )
-    if programme is None:
-        methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
-    else:
-        baseline = None if arguments.baseline is None else Baseline(arguments.baseline)
-        methods = programme.methods(detectors, controllers, baseline)
-    suites, objects = _with_objects(suites, arguments)
-    suites = with_assignments(suites, arguments.set, noise=not arguments.no_noise)
-    detectors, controllers = (tuple(dict.fromkeys(names)) for names in zip(*methods, strict=True))
-    name = suites[0].name if programme is None else arguments.suite
-    out = arguments.out or Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
-    plan = Plan(
-        suites=suites,
-        objects=objects,
-        programme=None if programme is None else name,
-        methods=methods,
-        weights=parse_weights(arguments.weights, detectors),
-        detector_settings=detector_settings(detectors, shared_table(suites, "detector")),
-        controller_settings=controller_settings(
-            controllers, shared_table(suites, "controller"), arguments.preset
-        ),
-        runtime=arguments.runtime,
-        episodes=arguments.episodes,
-        until_ci=arguments.until_ci,
-        max_episodes=arguments.max_episodes,
-        seed=arguments.seed,
-        camera=arguments.camera,
-        noise=not arguments.no_noise,
-        record=arguments.record,
-        recordings=out / "recordings",
-        traces=out / "traces",
-    )
-    return plan, out
-
-
-def _with_objects(
-    suites: tuple[Suite, ...], arguments: argparse.Namespace
-) -> tuple[tuple[Suite, ...], tuple[MeshVerdict, ...]]:
-    """The suites with the objects that the command line brings, if any, and the verdict on every mesh."""
-    if not arguments.objects:
-        return suites, ()
-    if len(suites) > 1:
-        raise ConfigError("--objects with several suites", got=arguments.suite, allowed="one suite")
-    from mpgrasp.bench.meshes.intake import take_objects
-
-    suite, verdicts = take_objects(
-        suites[0],
-        arguments.objects,
-        density=arguments.density,
-        workers=arguments.workers,
-        quiet=arguments.quiet,
-    )
-    return (suite,), verdicts
 
 
 def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
@@ -231,6 +144,8 @@ def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
         directory.close()
     print_table(cells)
     print_tests(tests)
+    if plan.sweep and cells:
+        print_report_table(sweep_table(plan.sweep, lines))
     print(f"Results: {directory.path}")
     if errors:
         print(

@@ -10,8 +10,8 @@ from mpgrasp.bench.analysis.hypotheses import evaluate
 from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.evaluation import Evaluation
-from mpgrasp.bench.report.filmstrips import Films, filmstrips
-from mpgrasp.bench.report.kept_traces import read_traces
+from mpgrasp.bench.report.filmstrips import NO_FILMS, Films, filmstrips
+from mpgrasp.bench.report.kept_traces import NO_TRACES, read_traces
 from mpgrasp.bench.report.motion_figures import SuiteMotion, motion_figures
 from mpgrasp.bench.report.orderings import Orderings, orderings, pair_table
 from mpgrasp.bench.report.outcome_figures import outcome_figures
@@ -23,6 +23,7 @@ from mpgrasp.bench.report.run_tables import (
     failure_table,
     run_table,
 )
+from mpgrasp.bench.report.sweep import SweepSection, sweep_sections
 from mpgrasp.bench.report.tables import (
     TickTimes,
     motion_table,
@@ -35,8 +36,11 @@ from mpgrasp.bench.report.thickness import ThinObjects, thin_objects
 from mpgrasp.bench.results.runs import Runs, find_runs
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
+from mpgrasp.suite import base_name
 
 FILES = ("report.html", "report.md")
+DRAWN = 12
+"""Suites of a report, the points of a sweep among them, that have figures and filmstrips of their own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +48,11 @@ class Report:
     """Everything that a report says; the templates lay it out, in the order of `sections.j2`."""
 
     suites: Sequence[str]
+    """Names without the points of a sweep."""
     counts: str
     """Numbers of what was played, in a sentence."""
     overview: Table
+    sweeps: Sequence[SweepSection]
     by_object: Sequence[Table]
     refused_meshes: Table | None
     paper: PaperTables
@@ -60,6 +66,8 @@ class Report:
     thin_objects: ThinObjects | None
     ticks: TickTimes | None
     films: Films
+    not_drawn: str
+    """Sentence on figures that are left out; empty where none is."""
     failures: Table | None
     runs: Table
     commands: Sequence[str]
@@ -88,23 +96,27 @@ def write_report(folders: Sequence[Path], out: Path) -> Path:
 
 def make_report(runs: Runs) -> Report:
     """The report on some runs, as text, numbers and figures."""
-    evaluation, kept = Evaluation.of(runs), read_traces(runs)
+    evaluation = Evaluation.of(runs)
+    drawn = runs.suites if len(runs.suites) <= DRAWN else []
+    kept = read_traces(runs) if drawn else NO_TRACES
     return Report(
-        suites=runs.suites,
+        suites=list(dict.fromkeys(map(base_name, runs.suites))),
         counts=_counts_text(evaluation),
         overview=overview_table(evaluation),
+        sweeps=sweep_sections(runs),
         by_object=object_tables(evaluation),
         refused_meshes=refused_meshes_table(runs),
         paper=paper_tables(evaluation),
         orderings=orderings({baseline: evaluate(runs.cells, baseline=baseline) for baseline in Baseline}),
         pairs=pair_table(evaluation.tests),
-        outcomes={suite: outcome_figures(evaluation, suite) for suite in runs.suites},
+        outcomes={suite: outcome_figures(evaluation, suite) for suite in drawn},
         motion=motion_table(evaluation),
-        motion_by_suite=[motion_figures(evaluation, suite, kept) for suite in runs.suites],
+        motion_by_suite=[motion_figures(evaluation, suite, kept) for suite in drawn],
         unreadable_traces=kept.unreadable,
         thin_objects=thin_objects(evaluation),
         ticks=tick_times(runs),
-        films=filmstrips(runs, kept),
+        films=filmstrips(runs, kept) if drawn else NO_FILMS,
+        not_drawn="" if drawn else _not_drawn_text(runs),
         failures=failure_table(runs),
         runs=run_table(runs),
         commands=[run.about.command for run in runs.runs],
@@ -125,6 +137,12 @@ def _counts_text(evaluation: Evaluation) -> str:
     if not all(run.complete for run in evaluation.runs.runs):
         text += " Not all is there yet: a run is not complete."
     return text
+
+
+def _not_drawn_text(runs: Runs) -> str:
+    if not runs.suites:
+        return ""
+    return f"Not drawn: {len(runs.suites)} suites, of which no more than {DRAWN} are drawn in one report."
 
 
 def _replace(file: Path, text: str) -> None:

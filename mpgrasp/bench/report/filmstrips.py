@@ -26,6 +26,10 @@ class Films:
     """Cells, with an ending that no episode of theirs had."""
 
 
+NO_FILMS = Films(strips=(), missing=None, without_episode=())
+"""Filmstrips of a report that shows none."""
+
+
 def filmstrips(runs: Runs, kept: KeptTraces) -> Films:
     """Filmstrips as far as stills were kept."""
     strips, missing, without = [], [], []

@@ -33,6 +33,10 @@ class KeptTraces:
         return found
 
 
+NO_TRACES = KeptTraces(by_cell={}, unreadable=())
+"""Traces of a report that draws none."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class MissingTraces:
     """Cells of which no trace was kept."""

@@ -73,7 +73,7 @@ def _way_figure(evaluation: Evaluation, cell: Cell, kept: KeptTraces) -> Figure:
         f"({t.positions[-1, 0]:.2f}, {t.positions[-1, 1]:.2f}) m"
         for title, t in examples
     )
-    name, extent = name_of(cell.method), evaluation.runs.owners[cell].map_extent(cell.controller)
+    name, extent = name_of(cell.method), evaluation.runs.owners[cell].map_extent(cell)
     mapped = extent and any(trace.entropy is not None for _, trace in examples)
     under = "over the entropy map of the last look" if mapped else "without an entropy map"
     alt = f"Way of the tool point from above, suite {cell.suite}, {name}: {said}."

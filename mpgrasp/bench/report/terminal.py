@@ -8,6 +8,7 @@ from types import TracebackType
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -20,6 +21,7 @@ from rich.table import Table
 
 from mpgrasp.bench.analysis.summary import CellSummary, ClearingCounts, PairedTest
 from mpgrasp.bench.record import ErrorLine, Line, played
+from mpgrasp.bench.report.document import Table as ReportTable
 from mpgrasp.bench.report.intervals import stops_text
 from mpgrasp.statistics import SIGNIFICANCE
 
@@ -52,7 +54,7 @@ def result_table(cells: Sequence[CellSummary]) -> Table:
         table.add_column("failed picks")
     for cell in cells:
         table.add_row(
-            cell.suite,
+            escape(cell.suite),
             cell.detector,
             cell.controller,
             str(cell.n),
@@ -105,7 +107,7 @@ def print_tests(tests: Sequence[PairedTest], console: Console | None = None) -> 
         table.add_column(heading, justify="right", no_wrap=True)
     for test in tests:
         table.add_row(
-            test.suite,
+            escape(test.suite),
             " ".join(test.a),
             " ".join(test.b),
             str(test.n),
@@ -115,6 +117,19 @@ def print_tests(tests: Sequence[PairedTest], console: Console | None = None) -> 
             f"{test.p_holm:.3g}" + (" *" if test.p_holm < SIGNIFICANCE else ""),
         )
     wide_console(console).print(table)
+
+
+def print_report_table(content: ReportTable, console: Console | None = None) -> None:
+    """Print a table of a report, with its note."""
+    table = Table(
+        *map(escape, content.headings), box=SIMPLE_HEAD, padding=(0, 0), collapse_padding=True,
+        header_style="bold", title=escape(content.caption), title_justify="left",
+    )  # fmt: skip
+    for row in content.rows:
+        table.add_row(*map(escape, row))
+    console = wide_console(console)
+    console.print(table)
+    console.print(escape(content.note), highlight=False)
 
 
 def wide_console(console: Console | None = None) -> Console:
@@ -189,7 +204,7 @@ class RunProgress:
         self._done += 1
         self._successes += bool(line.success)
         if self._bar:
-            cell = f"{line.suite} {line.detector} {line.controller}"
+            cell = f"{escape(line.suite)} {line.detector} {line.controller}"
             self._bar.update(self._task, description=cell, completed=self._done, successes=self._successes)
         if isinstance(line, ErrorLine):
             self.note(f"error: {line.error}")

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from msgspec import field
 
+from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Record
 from mpgrasp.bench.results.provenance import MadeWith
 from mpgrasp.files.json_values import Difference, difference
@@ -77,7 +78,8 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     """All that decides what the lines of a run say.
 
     A run of one suite has its card, with `settings`, `episode` and `episodes`; a run of a programme has the
-    programme's name, with `suites`.
+    programme's name, with `suites`; a sweep the name of the suite that is swept, with its points as `suites`.
+    Cards of detectors and controllers are those of the first suite.
     """
 
     settings: Card = field(default_factory=dict)
@@ -85,6 +87,8 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     is named after the setting."""
     suite: SuiteCard | str
     suites: tuple[SuitePart, ...] = ()
+    sweep: Sweep | None = None
+    """Grid of a sweep, whose points are the suites."""
     episode: Card | None = None
     episodes: int | None = None
     cells: tuple[str, ...]
@@ -179,7 +183,7 @@ class RunDescription(Record, frozen=True, kw_only=True, omit_defaults=True):
     ik: Card
     reflex: Card
     worlds: dict[str, WorldCard] = field(default_factory=dict)
-    """World by suite, where there are several suites."""
+    """World by suite, where there are several suites; of a sweep, those that differ from the first one's."""
     objects: tuple[MeshCard, ...] = ()
     """Every mesh of `--objects`."""
     made_with: MadeWith

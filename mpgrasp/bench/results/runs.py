@@ -46,9 +46,12 @@ class Run:
         known = self.configuration.detectors
         return any(card.name == detector and card.reads_truth for card in known)
 
-    def map_extent(self, controller: str) -> tuple[float, float, float, float] | None:
-        """Bounds in x, then in y [m] of a controller's entropy map; None where it is not known."""
-        configs = [card.config for card in self.configuration.controllers if card.name == controller]
+    def map_extent(self, cell: Cell) -> tuple[float, float, float, float] | None:
+        """Bounds in x, then in y [m] of the entropy map of a cell; None where it is not known."""
+        configs = [card.config for card in self.configuration.controllers if card.name == cell.controller]
+        if self.configuration.sweep:  # whose points may differ in them
+            parts = [part for part in self.configuration.parts if part.suite.name == cell.suite]
+            configs = [part.settings.get("controller", {}).get(cell.controller) for part in parts]
         try:
             (config,) = configs
             (x, y), half = config["grid"]["centre"], config["grid"]["extent"] / 2

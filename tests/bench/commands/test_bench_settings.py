@@ -176,7 +176,7 @@ def test_what_is_set_reaches_what_plays(fake_world: object, tmp_path: Path) -> N
         return fakes.FakeResult(seed, scene)
 
     from mpgrasp.bench.commands.run import parse
-    from mpgrasp.bench.playing.run import make_plan
+    from mpgrasp.bench.playing.planning import make_plan
 
     words = [*THIN, "--preset", "published-grid", *(word for text in SET for word in ("--set", text))]
     plan, _ = make_plan(parse(words))
@@ -202,7 +202,7 @@ def test_every_printed_setting_stands_in_run_json_with_its_value(
     fake_world.setattr("mpgrasp.episode.clearing.run_clearing", fakes.run_episode)
     from mpgrasp.bench.commands.run import parse
     from mpgrasp.bench.playing.description import configuration as describe
-    from mpgrasp.bench.playing.run import make_plan
+    from mpgrasp.bench.playing.planning import make_plan
     from mpgrasp.files.json_values import json_value
 
     words = [suite, "--detector", "oracle", "--controller", "mppc,open_loop", "--set", "controller.gamma=2"]

@@ -1,0 +1,122 @@
+"""The plan of a command line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mpgrasp.bench.analysis.paper import Baseline
+from mpgrasp.bench.playing.plan import Plan, every_method
+from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
+from mpgrasp.bench.playing.sweep import Layout, lay_out
+from mpgrasp.bench.record import Method
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
+from mpgrasp.settings.changes import refuse_different_methods, with_assignments
+from mpgrasp.settings.grid import parse_grid
+from mpgrasp.settings.sharing import MethodSettings
+from mpgrasp.suite import Suite
+
+if TYPE_CHECKING:
+    from mpgrasp.bench.meshes.check import MeshVerdict
+
+DETECTOR, CONTROLLER = "dhrnet", "mppc"
+"""The method that plays a suite unless told otherwise."""
+
+
+def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
+    """The plan of a command line and the folder of its results.
+
+    Raises:
+        ConfigError: input that cannot be used.
+    """
+    detectors, controllers = (
+        None if names is None else tuple(names.split(","))
+        for names in (arguments.detector, arguments.controller)
+    )
+    for name in detectors or ():
+        check_name("detector", name, detector_names())
+    for name in controllers or ():
+        check_name("controller", name, controller_names())
+    only = None if arguments.suites is None else tuple(arguments.suites.split(","))
+    suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
+    if arguments.baseline is not None and (programme is None or controllers is not None):
+        raise ConfigError(
+            "--baseline says which controllers of a programme play",
+            got=arguments.baseline,
+            allowed=f"with {', '.join(PROGRAMMES)}, and without --controller",
+        )
+    if programme is None:
+        methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
+    else:
+        baseline = None if arguments.baseline is None else Baseline(arguments.baseline)
+        methods = programme.methods(detectors, controllers, baseline)
+    suites, objects = _with_objects(suites, arguments)
+    name = suites[0].name if programme is None else arguments.suite
+    laid = _swept(suites, methods, arguments) if arguments.sweep else None
+    if laid is None:
+        suites = with_assignments(suites, arguments.set, noise=not arguments.no_noise)
+        refuse_different_methods(suites)
+    detectors, controllers = (tuple(dict.fromkeys(names)) for names in zip(*methods, strict=True))
+    out = arguments.out or Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    plan = Plan(
+        suites=suites if laid is None else laid.suites,
+        objects=objects,
+        programme=None if programme is None and laid is None else name,
+        sweep=None if laid is None else laid.sweep,
+        methods=methods,
+        weights=parse_weights(arguments.weights, detectors),
+        settings=_settings(suites, detectors, controllers, arguments.preset)
+        if laid is None
+        else laid.settings,
+        runtime=arguments.runtime,
+        episodes=arguments.episodes,
+        until_ci=arguments.until_ci,
+        max_episodes=arguments.max_episodes,
+        seed=arguments.seed,
+        camera=arguments.camera,
+        noise=not arguments.no_noise,
+        record=arguments.record,
+        recordings=out / "recordings",
+        traces=out / "traces",
+    )
+    return plan, out
+
+
+def _settings(
+    suites: Sequence[Suite], detectors: Sequence[str], controllers: Sequence[str], preset: str | None
+) -> dict[str, MethodSettings]:
+    """The settings of what plays, the same in every suite."""
+    shared = MethodSettings.of(suites[0], detectors, controllers, preset)
+    return {suite.name: shared for suite in suites}
+
+
+def _swept(suites: Sequence[Suite], methods: Sequence[Method], arguments: argparse.Namespace) -> Layout:
+    """The points of a sweep, each as a suite."""
+    if len(suites) > 1:
+        raise ConfigError("a sweep of several suites", got=arguments.suite, allowed="one suite")
+    grid = parse_grid(arguments.set)
+    return lay_out(suites[0], grid, methods, noise=not arguments.no_noise, preset=arguments.preset)
+
+
+def _with_objects(
+    suites: tuple[Suite, ...], arguments: argparse.Namespace
+) -> tuple[tuple[Suite, ...], tuple[MeshVerdict, ...]]:
+    """The suites with the objects that the command line brings, if any, and the verdict on every mesh."""
+    if not arguments.objects:
+        return suites, ()
+    if len(suites) > 1:
+        raise ConfigError("--objects with several suites", got=arguments.suite, allowed="one suite")
+    from mpgrasp.bench.meshes.intake import take_objects
+
+    suite, verdicts = take_objects(
+        suites[0],
+        arguments.objects,
+        density=arguments.density,
+        workers=arguments.workers,
+        quiet=arguments.quiet,
+    )
+    return (suite,), verdicts
