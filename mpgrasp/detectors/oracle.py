@@ -12,8 +12,8 @@ import numpy as np
 
 from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps, antipodal_grasps
-from mpgrasp.detectors.antipodal.hand import HandGeometry
 from mpgrasp.detectors.central_square import central_square, empty_map, says_something
+from mpgrasp.detectors.config import OracleConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, world_to_image_angle
@@ -24,14 +24,14 @@ class OracleDetector:
     """Detector that reads the truth.
 
     Args:
-        hand: geometry of the gripper.
+        config: geometry of the gripper, and how sure its grasps must be.
     """
 
     name = "oracle"
     reads_truth = True
 
-    def __init__(self, hand: HandGeometry | None = None) -> None:
-        self.config = hand or HandGeometry()
+    def __init__(self, config: OracleConfig | None = None) -> None:
+        self.config = config or OracleConfig()
         self._grasps: WorldGrasps | None = None
 
     def reset(self, truth: HeightMap | None) -> None:

@@ -40,6 +40,8 @@ class HandGeometry:
     """Distance from the tool point to the camera, across the closing direction and on either side [m]."""
     camera_size: tuple[float, float] = (0.094, 0.034)
     """The camera along and across the closing direction, with a little play [m]."""
+    footprint: tuple[float, float] = (hand.FINGER_WIDTH + 0.004, hand.FINGER_THICKNESS + 0.002)
+    """Part of the support that may stop a tip, across and along the closing direction, play included [m]."""
     tip_clearance: float = 0.0005
     """Height of the tips over what they stop on [m]."""
     margin: tuple[float, float] = (0.005, 0.008)
@@ -49,6 +51,8 @@ class HandGeometry:
     margin."""
     min_depth: float = 0.0012
     """Least height of the contacts above the tips [m]."""
+    depth_range: float = 0.002
+    """Height above the least at which a grasp is nearly as good as a deeper one [m]."""
     friction_angle: float = np.deg2rad(25.0)
     """Half the friction cone, on the safe side [rad]."""
 

@@ -32,6 +32,8 @@ NEIGHBOURHOOD = 0.05
 """No finger, with its margin, reaches farther beside what it grasps [m]."""
 LANDING = 0.6
 """Worth of a grasp whose tips stop on something other than the support."""
+_NOTHING = np.float32(-1.0)
+"""Height lower than any [m]."""
 
 
 class TurnedMap:
@@ -47,7 +49,12 @@ class TurnedMap:
         self.finger = odd((hand.pad_width + hand.play) / cell)
         self.pad = odd(hand.pad_width / cell)
         thickness = odd((hand.finger_thickness + 0.002) / cell)
-        self.under_finger = _highest(self.height, self.finger, thickness)
+        stops = odd(hand.footprint[0] / cell), odd(hand.footprint[1] / cell)
+        bare = self.label == 0
+        self.under_finger = np.maximum(
+            _highest(np.where(bare, _NOTHING, self.height), self.finger, thickness),
+            _highest(np.where(bare, self.height, _NOTHING), *stops),
+        )
         self.top = float(self.height[self.label > 0].max(initial=0))  # [m]
         self.under_palm = None
         if self.top > hand.palm_clearance:
@@ -161,8 +168,8 @@ class TurnedMap:
         q = np.where(lands, LANDING, 1.0)
         depth = edges.height - tip
         q *= (depth >= hand.min_depth) * (edges.steep > 0.7)
-        q *= np.clip(0.45 + 0.45 * (depth - hand.min_depth) / 0.002, 0, 0.9)
-        q *= 1 + 0.11 * np.clip((depth - hand.min_depth - 0.002) / 0.005, 0, 1)
+        q *= np.clip(0.45 + 0.45 * (depth - hand.min_depth) / hand.depth_range, 0, 0.9)
+        q *= 1 + 0.11 * np.clip((depth - hand.min_depth - hand.depth_range) / 0.005, 0, 1)
         q *= np.clip(edges.length / FULL_CONTACT, 0, 1)
         q *= np.clip(1 - (edges.wedge / hand.friction_angle) ** 2, 0, 1)
         q *= _bell(edges.turn / ANGLE_TOLERANCE)
