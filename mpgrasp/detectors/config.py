@@ -39,6 +39,8 @@ class OracleConfig(HandGeometry):
 
     footprint: tuple[float, float] = (hand.FINGER_WIDTH, hand.FINGER_THICKNESS)
     """Area that a tip lands on, across and along the closing direction [m]."""
+    wider: tuple[float, ...] = (0.012, 0.016, 0.020, 0.025)
+    """Wider margins, in rising order, that are tried for thin things [m]."""
     min_depth: float = -0.0002
     """Least height of the contacts above the tips [m]; below 0, because the heights are not exact."""
     depth_range: float = 0.001

@@ -46,6 +46,9 @@ class HandGeometry:
     """Height of the tips over what they stop on [m]."""
     margin: tuple[float, float] = (0.005, 0.008)
     """Least and wanted free space between object and open pad, on each side [m]."""
+    wider: tuple[float, ...] = ()
+    """Wider margins, in rising order, tried for thin things: the tips may land lower, and meet no crest
+    on the way in [m]. None: the wanted margin alone, and nothing but the landing counts."""
     opening_margin: float = 0.010
     """Opening that the execution adds to a grasp's width, both sides together [m]; at most twice the least
     margin."""
