@@ -21,7 +21,7 @@ from mpgrasp.controllers import make_controller
 from mpgrasp.controllers.config import MPPC
 from mpgrasp.depth import DepthFrame, crop_resize, inpaint
 from mpgrasp.detectors import make_detector
-from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.detectors.config import OracleConfig
 from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
 from mpgrasp.episode.config import EpisodeConfig
@@ -83,7 +83,7 @@ def test_a_suite_s_settings_are_those_of_the_environment() -> None:
     assert env.config.sensor.subpixel == 0.12
     assert env.mppc.config == replace(MPPC, z_min=0.2)
     assert isinstance(env.detector, OracleDetector)
-    assert env.detector.config == HandGeometry(play=0.002)
+    assert env.detector.config == OracleConfig(play=0.002)
     with pytest.raises(ConfigError, match=r"controller\.threshold: no setting of mppc"):
         GraspEnv(parse_suite("mine", {"title": "t", "controller": {"threshold": 1}}))
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.config import NetworkDetectorConfig
+from mpgrasp.detectors.config import NetworkDetectorConfig, OracleConfig
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.detectors.networks.registry import NETWORKS
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 
-DetectorConfig = NetworkDetectorConfig | HandGeometry
+DetectorConfig = NetworkDetectorConfig | OracleConfig
 """Settings of a detector: those of a network's image processing, or the hand that the oracle knows."""
 _Maker = Callable[[Path | str | None, str, DetectorConfig | None], GraspDetector]
 
@@ -26,7 +25,7 @@ def _network(name: str) -> _Maker:
     def make(weights: Path | str | None, runtime: str, config: DetectorConfig | None) -> GraspDetector:
         from mpgrasp.detectors.network_detector import NetworkDetector
 
-        assert not isinstance(config, HandGeometry)
+        assert not isinstance(config, OracleConfig)
         return NetworkDetector.load(name, weights, config, runtime)
 
     return make
@@ -50,7 +49,7 @@ DETECTORS: dict[str, _Maker] = {
 
 def detector_defaults(name: str) -> DetectorConfig:
     """Return the settings that a detector of the registry has unless others are given; loads no torch."""
-    return HandGeometry() if name == "oracle" else NetworkDetectorConfig()
+    return OracleConfig() if name == "oracle" else NetworkDetectorConfig()
 
 
 def make_detector(

@@ -1,11 +1,13 @@
-"""Settings of the image processing around a network."""
+"""Settings of the detectors: the image processing around a network, and the hand that the oracle knows."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from mpgrasp.depth import CROP
+from mpgrasp.detectors.antipodal.hand import HandGeometry
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.robot import hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,3 +26,22 @@ class NetworkDetectorConfig:
     def __post_init__(self) -> None:
         if self.crop < 1 or min(self.quality_sigma, self.angle_sigma, self.width_sigma) < 0:
             raise ConfigError("unusable detector settings", got=self, allowed="crop from 1, sigmas from 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OracleConfig(HandGeometry):
+    """The hand as the oracle sees it: without the play that labels for networks have.
+
+    The labels leave out what a camera can hardly tell; the oracle knows the cloth under each finger tip. Of
+    280 trials with sticks of 1 mm, none lifted where the contacts lay 0.25 mm or more below the tips'
+    expected height, 36 % where they lay less below it, 65 % up to 0.25 mm above it, and 87 % beyond that.
+    """
+
+    footprint: tuple[float, float] = (hand.FINGER_WIDTH, hand.FINGER_THICKNESS)
+    """Area that a tip lands on, across and along the closing direction [m]."""
+    wider: tuple[float, ...] = (0.012, 0.016, 0.020, 0.025)
+    """Wider margins, in rising order, that are tried for thin things [m]."""
+    min_depth: float = -0.0002
+    """Least height of the contacts above the tips [m]; below 0, because the heights are not exact."""
+    depth_range: float = 0.001
+    """Height above the least at which a grasp is nearly as good as a deeper one [m]."""

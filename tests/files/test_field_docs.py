@@ -12,7 +12,7 @@ from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.controllers.grid_map import GridConfig
 from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.config import NetworkDetectorConfig
+from mpgrasp.detectors.config import NetworkDetectorConfig, OracleConfig
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
 from mpgrasp.files.field_docs import field_docs
 from mpgrasp.motion.execution_config import ExecutionConfig
@@ -48,7 +48,8 @@ def test_a_docstring_stands_on_one_line_and_a_class_goes_before_its_base() -> No
 @pytest.mark.parametrize(
     "kind",
     [SceneConfig, EpisodeConfig, ClearingConfig, ExecutionConfig, DepthNoise, CameraConfig, MotionConfig,
-     IkConfig, ReflexConfig, ReachConfig, GridConfig, NetworkDetectorConfig, HandGeometry],
+     IkConfig, ReflexConfig, ReachConfig, GridConfig, NetworkDetectorConfig, HandGeometry,
+     OracleConfig],
 )  # fmt: skip
 def test_every_setting_has_a_meaning(kind: type[Any]) -> None:
     assert [field.name for field in fields(kind) if field.name not in field_docs(kind)] == []

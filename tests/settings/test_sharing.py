@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from mpgrasp.controllers.config import MPPC, MVP, PRESETS, ReachConfig
-from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.config import NetworkDetectorConfig
+from mpgrasp.detectors.config import NetworkDetectorConfig, OracleConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 
@@ -32,7 +31,7 @@ TUNABLE, FIXED = f"{__name__}:Tunable", f"{__name__}:Fixed"
 def test_without_settings_everybody_keeps_the_defaults() -> None:
     assert controller_settings(("mppc", "mvp"), {}) == {"mppc": MPPC, "mvp": MVP}
     found = detector_settings(("dhrnet", "oracle", FIXED), {})
-    assert found == {"dhrnet": NetworkDetectorConfig(), "oracle": HandGeometry(), FIXED: {}}
+    assert found == {"dhrnet": NetworkDetectorConfig(), "oracle": OracleConfig(), FIXED: {}}
 
 
 def test_a_setting_goes_to_every_one_that_has_it() -> None:
@@ -43,7 +42,7 @@ def test_a_setting_goes_to_every_one_that_has_it() -> None:
     assert (loop.min_quality, loop.gamma) == (0.3, controller_settings(("open_loop",), {})["open_loop"].gamma)  # type: ignore[union-attr]
     assert found[FIXED] == {}
     assert detector_settings(("oracle", "dhrnet", FIXED), {"threshold": 1, "play": 0.0}) == {
-        "oracle": HandGeometry(play=0.0),
+        "oracle": OracleConfig(play=0.0),
         "dhrnet": NetworkDetectorConfig(),
         FIXED: {"threshold": 1},
     }

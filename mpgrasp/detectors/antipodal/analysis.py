@@ -16,15 +16,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.detectors.antipodal.turned_map import TurnedMap, odd
+from mpgrasp.detectors.antipodal.turned_map import TurnedMap
+from mpgrasp.detectors.antipodal.windows import Float32, odd
 from mpgrasp.geometry import FloatArray, wrap_half_pi
 from mpgrasp.height_map import HeightMap
 from mpgrasp.linear_algebra import product
-
-Float32 = NDArray[np.float32]
 
 SLIDE = 0.010
 """Length across the closing direction over which worth is averaged: the hand may be off [m]."""

@@ -40,15 +40,22 @@ class HandGeometry:
     """Distance from the tool point to the camera, across the closing direction and on either side [m]."""
     camera_size: tuple[float, float] = (0.094, 0.034)
     """The camera along and across the closing direction, with a little play [m]."""
+    footprint: tuple[float, float] = (hand.FINGER_WIDTH + 0.004, hand.FINGER_THICKNESS + 0.002)
+    """Part of the support that may stop a tip, across and along the closing direction, play included [m]."""
     tip_clearance: float = 0.0005
     """Height of the tips over what they stop on [m]."""
     margin: tuple[float, float] = (0.005, 0.008)
     """Least and wanted free space between object and open pad, on each side [m]."""
+    wider: tuple[float, ...] = ()
+    """Wider margins, in rising order, tried for thin things: the tips may land lower, and meet no crest
+    on the way in [m]. None: the wanted margin alone, and nothing but the landing counts."""
     opening_margin: float = 0.010
     """Opening that the execution adds to a grasp's width, both sides together [m]; at most twice the least
     margin."""
     min_depth: float = 0.0012
     """Least height of the contacts above the tips [m]."""
+    depth_range: float = 0.002
+    """Height above the least at which a grasp is nearly as good as a deeper one [m]."""
     friction_angle: float = np.deg2rad(25.0)
     """Half the friction cone, on the safe side [rad]."""
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from mpgrasp.detectors.antipodal.hand import HandGeometry
+from mpgrasp.detectors.antipodal.landing import Landing, Runs
+from mpgrasp.detectors.antipodal.windows import Float32, highest, odd
 from mpgrasp.geometry import FloatArray
-
-Float32 = NDArray[np.float32]
 
 LEVEL_STEP = 0.008
 """Spacing of the tip heights that are tried above the cloth [m]."""
@@ -46,17 +45,16 @@ class TurnedMap:
         self.cell, self.hand = cell, hand
         self.finger = odd((hand.pad_width + hand.play) / cell)
         self.pad = odd(hand.pad_width / cell)
-        thickness = odd((hand.finger_thickness + 0.002) / cell)
-        self.under_finger = _highest(self.height, self.finger, thickness)
+        self.landing = Landing.on(self.height, self.label, cell, hand)
         self.top = float(self.height[self.label > 0].max(initial=0))  # [m]
         self.under_palm = None
         if self.top > hand.palm_clearance:
             along, across = hand.palm_size
-            self.under_palm = _highest(self.height, odd(across / cell), odd(along / cell))
+            self.under_palm = highest(self.height, odd(across / cell), odd(along / cell))
         self.under_camera = None
         if self.top > hand.camera_clearance:
             along, across = hand.camera_size
-            under = _highest(self.height, odd(across / cell), odd(along / cell))
+            under = highest(self.height, odd(across / cell), odd(along / cell))
             shift = min(round(hand.camera_offset / cell), len(under))
             padded = np.pad(under, ((shift, shift), (0, 0)))
             # the hand may come in either way round
@@ -82,9 +80,10 @@ class TurnedMap:
         top, left = max(rows[0] - pad, 0), max(cols[0] - pad, 0)
         window = np.s_[top : rows[-1] + pad + 1, left : cols[-1] + pad + 1]
         part = copy.copy(self)
-        for name in ("height", "label", "under_finger", "under_palm", "under_camera"):
+        for name in ("height", "label", "under_palm", "under_camera"):
             whole = getattr(self, name)
             setattr(part, name, None if whole is None else np.ascontiguousarray(whole[window]))
+        part.landing = self.landing.cut(window)
         part.masses = self.masses - (left, top)
         part._count_cells()
         return part, window
@@ -135,11 +134,15 @@ class TurnedMap:
             )
             margin = np.minimum(margin, self._free(tall > 0, r, a, b) - hand.shaft_thickness)
         room = margin - 0.5 * cell >= np.minimum(hand.margin[0], (hand.max_opening - run) / 2)
-        margin = np.minimum(np.minimum(margin - 0.5 * cell, (hand.max_opening - run) / 2), hand.margin[1])
+        free = margin - 0.5 * cell
+        margin = np.minimum(np.minimum(free, (hand.max_opening - run) / 2), hand.margin[1])
         # where the tips stop: on what lies under the open fingers, or where the palm forbids to go on
-        reach = np.rint((margin + hand.finger_thickness / 2) / cell).astype(int)
-        left, right = np.maximum(a - reach, 0), np.minimum(b + reach, len(self.columns) - 1)
-        landing = np.maximum(self.under_finger[r, left], self.under_finger[r, right]) + hand.tip_clearance
+        runs = Runs(row=r, first=a, last=b)
+        if on_cloth and hand.wider:
+            free = np.minimum(free, (hand.max_opening - run) / 2)
+            margin, landing = self.landing.deepest(runs, self.height[r, c], margin, free)
+        else:
+            landing = self.landing.height(runs, margin)
         wanted = np.maximum(self.height[r, c] - hand.reach, 0)
         tip = np.maximum(wanted, landing)
         good = room
@@ -161,8 +164,8 @@ class TurnedMap:
         q = np.where(lands, LANDING, 1.0)
         depth = edges.height - tip
         q *= (depth >= hand.min_depth) * (edges.steep > 0.7)
-        q *= np.clip(0.45 + 0.45 * (depth - hand.min_depth) / 0.002, 0, 0.9)
-        q *= 1 + 0.11 * np.clip((depth - hand.min_depth - 0.002) / 0.005, 0, 1)
+        q *= np.clip(0.45 + 0.45 * (depth - hand.min_depth) / hand.depth_range, 0, 0.9)
+        q *= 1 + 0.11 * np.clip((depth - hand.min_depth - hand.depth_range) / 0.005, 0, 1)
         q *= np.clip(edges.length / FULL_CONTACT, 0, 1)
         q *= np.clip(1 - (edges.wedge / hand.friction_angle) ** 2, 0, 1)
         q *= _bell(edges.turn / ANGLE_TOLERANCE)
@@ -257,13 +260,3 @@ class _Edges:
 def _bell(x: FloatArray) -> FloatArray:
     bell: FloatArray = np.exp(-0.5 * x * x)
     return bell
-
-
-def odd(cells: float) -> int:
-    """Return the nearest odd whole number, so that a filter has a centre."""
-    return max(2 * round((cells - 1) / 2) + 1, 1)
-
-
-def _highest(height: Float32, rows: int, cols: int) -> Float32:
-    """Return the greatest height in a window of (rows, cols) around each cell."""
-    return np.asarray(cv2.dilate(height, np.ones((rows, cols), np.uint8)))
