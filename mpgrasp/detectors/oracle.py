@@ -19,7 +19,6 @@ from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap, world_to_image_angle
 from mpgrasp.height_map import HeightMap
 
-
 SILENT = 0.05
 """Quality below which an object counts as having no grasp."""
 TOP = 0.003
