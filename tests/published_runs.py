@@ -17,7 +17,10 @@ from typing import Any
 from scipy.stats import binomtest, wilcoxon
 
 RESULTS = Path(__file__).resolve().parent.parent / "benchmarks" / "results"
-NAMES = {"DHRNet": "dhrnet", "TF-Grasp": "tfgrasp", "GG-CNN2": "ggcnn2"}
+NAMES = {"DHRNet": "dhrnet", "TF-Grasp": "tfgrasp", "GG-CNN": "ggcnn", "GG-CNN2": "ggcnn2"}
+THICKNESS = ("dhrnet", "tfgrasp", "ggcnn2")
+"""Detectors of the run `closed-thickness`."""
+REAL_CELL = "real-cell/"
 PARTS, BY_MEAN = "controller-parts/stacked", "benchmarks.controller_parts:MppcByMean"
 TIME_LIMIT = 900.0
 """Simulated time that a table which was not cleared counts as [s]."""
@@ -197,6 +200,35 @@ def drift_in(run: str, detector: str, controller: str, episode: int) -> float:
     return float(1e3 * cell(run, detector, controller)[episode]["blind_drift_m"])
 
 
+def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
+    """Return a cell of the table of the sticks of 2 mm, by the names that stand in it."""
+    name = NAMES[detector]
+    measures = {
+        "lifted %": success,
+        "protective stops": stopped,
+        "below 0.05": singular,
+        "least singular value": least_singular_value,
+        "blind drift, mm": blind_drift,
+    }
+    return measures[column](f"thin-2mm-{name}", name, controller.strip("`"))
+
+
+def real_cell(error: str, column: str) -> Any:
+    """Return a cell of the table of a real cell's errors: the rate of DHRNet with MP-PC in a suite."""
+    return success(REAL_CELL + error.strip("`"), "dhrnet", "mppc", column.removesuffix(" %"))
+
+
+def p_against_none(error: str, suite: str) -> float:
+    """Return p of McNemar's exact test between the episodes with an error and those without any."""
+    with_error, without = (
+        {k: line["success"] for k, line in cell(REAL_CELL + name, "dhrnet", "mppc", suite).items()}
+        for name in (error, "none")
+    )
+    ours = sum(with_error[k] and not without[k] for k in without)
+    theirs = sum(without[k] and not with_error[k] for k in without)
+    return float(binomtest(ours, ours + theirs, 0.5).pvalue) if ours + theirs else 1.0
+
+
 # clearing tables
 
 
@@ -256,7 +288,7 @@ def _drifts(detector: str, controller: str) -> dict[int, float]:
 
 def thin_sticks() -> int:
     """Return the number of sticks of 2 and 3 mm that each method met."""
-    (n,) = {len(_drifts(detector, name)) for detector in NAMES.values() for name in ("mppc", "mvp")}
+    (n,) = {len(_drifts(detector, name)) for detector in THICKNESS for name in ("mppc", "mvp")}
     return n
 
 
@@ -267,7 +299,7 @@ def drift(detector: str, controller: str) -> float:
 
 def largest_p_of_drifts() -> float:
     """Return the greatest corrected p of the drifts of both controllers, over the three detectors."""
-    pairs = [(_drifts(detector, "mvp"), _drifts(detector, "mppc")) for detector in NAMES.values()]
+    pairs = [(_drifts(detector, "mvp"), _drifts(detector, "mppc")) for detector in THICKNESS]
     return holm(float(wilcoxon([one[k] - other[k] for k in one]).pvalue) for one, other in pairs)[-1]
 
 
