@@ -215,7 +215,7 @@ def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
 
 def real_cell(error: str, column: str) -> Any:
     """Return a cell of the table of a real cell's errors: the rate of DHRNet with MP-PC in a suite."""
-    return success(REAL_CELL + error.strip("`"), "dhrnet", "mppc", column.removesuffix(" %"))
+    return success(REAL_CELL + error.split("`")[1], "dhrnet", "mppc", column.removesuffix(" %"))
 
 
 def p_against_none(error: str, suite: str) -> float:

@@ -129,6 +129,7 @@ def test_a_runtime_made_before_a_fork_refuses_to_go_on_in_it(tmp_path: Path) -> 
     code = """
 import multiprocessing
 import torch
+torch.set_num_threads(2)  # on one thread torch survives a fork
 from mpgrasp.detectors.network_detector import NetworkDetector
 image = np.zeros((224, 224), np.float32)
 made = [NetworkDetector.load("ggcnn2", runtime=name) for name in sys.argv[1:] or ["torch", "auto"]]

@@ -58,7 +58,7 @@ def test_all_that_a_setting_goes_to_may_have_reasons_of_their_own() -> None:
 
 def test_every_rule_is_about_settings_that_there_are() -> None:
     config = EpisodeConfig()
-    whole = {"scene": SceneConfig(), "controller": ReachConfig()}
+    whole: dict[str, Any] = {"scene": SceneConfig(), "controller": ReachConfig(), "episode": config}
     for group, idles in effects._GROUPS.items():
         known = set(keys(whole.get(group) or getattr(config, group)))
         assert {key for idle in idles for key in idle.keys} <= known, group

@@ -258,7 +258,9 @@ def test_what_is_printed_can_be_set(capsys: pytest.CaptureFixture[str]) -> None:
     printed = capsys.readouterr().out
     rows = [line.split(" # ")[0].strip() for line in printed.splitlines() if line.startswith("  ")]
     # these have no effect beside the others
-    idle = ("scene.jitter", "scene.pattern")
+    idle = (
+        "scene.jitter", "scene.pattern", "scene.cloth_wrinkle_", "scene.no_return_size", "sensor.pattern_",
+    )  # fmt: skip
     setting = [word for row in rows if not row.startswith(idle) for word in ("--set", row)]
     assert main([*words, *setting]) == 0
     assert capsys.readouterr().out == printed
