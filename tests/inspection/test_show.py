@@ -150,7 +150,7 @@ def test_a_height_that_cannot_be_is_refused(height: float) -> None:
         (["show", "oracle,oracle"], "unusable list of detectors"),
         (
             ["show", "oracle", "--set", "controller.gamma=1"],
-            "--set controller.gamma has no effect on a single look",
+            "gamma has no effect on a single look",
         ),
         (["show", "oracle", "--set", "sensor.subpixel=-1"], "--set sensor: subpixel of the depth sensor"),
         (["show", "oracle", "--set", "detector.crop=1"], "detector.crop: no setting of oracle"),

@@ -110,7 +110,7 @@ def test_a_bad_setting_is_one_line_that_names_the_place_and_exit_code_2(
         (["--set", "sensor.subpixel=0", "--set", "sensor.correlation_px=1"], "no effect: subpixel is 0"),
         (["--set", "ik.posture_cost=0", "--set", "ik.posture_rate=1"], "no effect: posture_cost is 0"),
         (["--set", "controller.gamma=0", "--set", "controller.cost_heights=[0.1, 0.2]"], "gamma is 0"),
-        (["--set", "controller.grid.cell=0.01", "--set", "controller.grid=1"], "keys within grid are set already"),
+        (["--set", "controller.grid.cell=0.01", "--set", "controller.grid=1"], "keys within grid are set"),
         (["--set", "controller.grid=1", "--set", "controller.grid.cell=0.01"], "grid has a value already"),
         (["--no-noise", "--set", "episode.sensor.subpixel=0.1"], "subpixel has no effect; got '--no-noise'"),
         (["--preset", "table3"], "--preset: unknown preset; got 'table3'"),
