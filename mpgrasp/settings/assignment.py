@@ -41,7 +41,10 @@ def parse_assignments(texts: Sequence[str]) -> Tables:
             place = place.setdefault(key, {})
             if not isinstance(place, dict):
                 raise ConfigError(f"--set {setting}: {key} has a value already", got=text, allowed=_FORM)
-        place[last] = parse_value(value, f"--set {setting}")
+        found = parse_value(value, f"--set {setting}")
+        if isinstance(place.get(last), dict) and not isinstance(found, dict):
+            raise ConfigError(f"--set {setting}: keys within {last} are set already", got=text, allowed=_FORM)
+        place[last] = found
     return tables
 
 

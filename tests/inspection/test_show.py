@@ -148,6 +148,13 @@ def test_a_height_that_cannot_be_is_refused(height: float) -> None:
         ([], "required: show|check|card"),
         (["show", "resnet"], "unknown detector; got 'resnet'"),
         (["show", "oracle,oracle"], "unusable list of detectors"),
+        (
+            ["show", "oracle", "--set", "controller.gamma=1"],
+            "gamma has no effect on a single look",
+        ),
+        (["show", "oracle", "--set", "sensor.subpixel=-1"], "--set sensor: subpixel of the depth sensor"),
+        (["show", "oracle", "--set", "detector.crop=1"], "detector.crop: no setting of oracle"),
+        (["show", "oracle", "--no-noise", "--set", "sensor.subpixel=1"], "has no effect; got '--no-noise'"),
         (["show", "oracle", "--suite", "thick"], "unknown suite"),
         (["show", "oracle", "--seed", "-1"], "negative seed"),
         (["show", "oracle", "--height", "0.95"], "out of reach"),

@@ -55,3 +55,5 @@ def test_what_is_no_assignment_is_refused(text: str) -> None:
 def test_a_value_is_no_table() -> None:
     with pytest.raises(ConfigError, match=r"--set controller\.grid\.cell: grid has a value already"):
         parse_assignments(["controller.grid=1", "controller.grid.cell=2"])
+    with pytest.raises(ConfigError, match=r"--set controller\.grid: keys within grid are set already"):
+        parse_assignments(["controller.grid.cell=2", "controller.grid=1"])

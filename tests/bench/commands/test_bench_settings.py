@@ -71,6 +71,14 @@ BAD = [
     ("episode.noise=false", "--set episode: no suite decides noise; got False; allowed: the option"),
     ("episode.time_limit=100", "--set episode: unknown key; got 'time_limit'"),
     ("episode.control_dt=-0.1", "--set episode: control_dt must be positive"),
+    ("episode.ik.dampings=1", "--set ik: unknown key; got 'dampings'"),
+    ("episode.execution=5", "--set episode, execution is not a table; got 5"),
+    ("controller.gamma=4/3m", "--set controller.gamma is unusable; got '4/3m'"),
+    ("controller.gamma=0,4/3", "controller of mppc, gamma is unusable; got [0, 1.3333333333333333]"),
+    ("controller.grid.weighted=true", "controller.grid.weighted has no effect: choice is pool"),
+    ("controller.grid.cell.x=1", "grid, cell is unusable; got {'x': 1}"),
+    ("scene.cloth_wavelength.x=1", "--set scene, cloth_wavelength is unusable"),
+    ("sensor=1", "unusable --set; got 'sensor=1'"),
 ]  # fmt: skip
 
 
@@ -99,6 +107,12 @@ def test_a_bad_setting_is_one_line_that_names_the_place_and_exit_code_2(
         (["--set", "controller.descent=coupled", "--set", "controller.v_z=0.1"], "descent is coupled"),
         (["--set", "ik.collisions=false", "--set", "ik.collision_rate=1"], "no effect: collisions is false"),
         (["--set", "execution.shake_time=0", "--set", "execution.shake_frequency=2"], "shake_time is 0"),
+        (["--set", "sensor.subpixel=0", "--set", "sensor.correlation_px=1"], "no effect: subpixel is 0"),
+        (["--set", "ik.posture_cost=0", "--set", "ik.posture_rate=1"], "no effect: posture_cost is 0"),
+        (["--set", "controller.gamma=0", "--set", "controller.cost_heights=[0.1, 0.2]"], "gamma is 0"),
+        (["--set", "controller.grid.cell=0.01", "--set", "controller.grid=1"], "keys within grid are set"),
+        (["--set", "controller.grid=1", "--set", "controller.grid.cell=0.01"], "grid has a value already"),
+        (["--no-noise", "--set", "episode.sensor.subpixel=0.1"], "subpixel has no effect; got '--no-noise'"),
         (["--preset", "table3"], "--preset: unknown preset; got 'table3'"),
         (["--preset", "robust", "--controller", "open_loop"], "robust has no effect; got 'open_loop'"),
         (["--detector", FAKE, "--set", "detector.threshold=1"], f"detector.threshold: no setting of {FAKE}"),

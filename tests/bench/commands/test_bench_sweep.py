@@ -11,7 +11,7 @@ from typing import Any
 
 import fakes
 import pytest
-from bench_runs import PLUG_INS, records, records_without_timing, same_results
+from bench_runs import PLUG_INS, records, same_results
 
 from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.record import Task
@@ -96,20 +96,35 @@ def test_any_setting_of_any_group_can_be_swept(
     assert len({line["scene_seed"] for line in records(tmp_path / "run")}) == 1
 
 
-def test_ten_settings_are_swept_at_once(played: list[dict[str, Any]], tmp_path: Path) -> None:
-    numeric = ["controller.gamma=1", "controller.alpha=1", "controller.v_1=0.1", "controller.window=0.1",
-               "sensor.subpixel=0.05", "sensor.min_z=0.1", "ik.damping=1e-6", "motion.smoothing=3",
-               "execution.lift=0.12,0.15", "episode.start_jitter=0,0.05"]  # fmt: skip
-    several = ["controller.gamma=1,2", "controller.v_1=0.1,0.08", "sensor.subpixel=0.05,0.06", *numeric[-2:]]
-    words = [
-        word for text in [*numeric[1:2], *numeric[3:4], *numeric[5:8], *several] for word in ("--set", text)
-    ]
+TEN = ("controller.gamma=1,2", "controller.v_1=0.1,0.08", "sensor.subpixel=0.05,0.06",
+       "execution.lift=0.12,0.15", "episode.start_jitter=0,0.05", "controller.alpha=1",
+       "controller.window=0.1", "sensor.min_z=0.1", "ik.damping=1e-6", "motion.smoothing=3")  # fmt: skip
+
+
+def test_ten_settings_are_set_at_once(played: list[dict[str, Any]], tmp_path: Path) -> None:
+    words = [word for text in TEN for word in ("--set", text)]
     out = tmp_path / "run"
     assert main(["sweep", *ORACLE, "--episodes", "1", "--out", str(out), *words]) == 0
-    assert len(words) == 20
-    assert len(played) == len({item["suite"] for item in records(out)}) == 2**5
-    assert "Not drawn: 32 suites" in (out / "report.md").read_text()
-    assert "## Sweep" in (out / "report.md").read_text()
+    assert len(played) == len({line["suite"] for line in records(out)}) == 2**5
+    assert {item["config"].motion.smoothing for item in played} == {3}
+    report = (out / "report.md").read_text()
+    assert "## Sweep" in report
+    assert "Not drawn: 32 suites" in report
+
+
+def test_ten_settings_of_two_values_each_are_laid_out() -> None:
+    from mpgrasp.bench.commands.sweep import make_parser
+    from mpgrasp.bench.playing.planning import make_plan
+
+    several = [
+        text if "," in text else text.replace("=", "=0.9*") + "," + text.partition("=")[2] for text in TEN
+    ]
+    several[-1] = "motion.smoothing=3,4"
+    words = [word for text in several for word in ("--set", text)]
+    plan, _ = make_plan(make_parser().parse_args(["thin", "--detector", "oracle", *words]))
+    assert len(plan.suites) == len({task.stem for task in plan.tasks() if task.episode == 0}) == 2**10
+    gammas = [plan.settings_of(suite.name).controllers["mppc"] for suite in plan.suites]
+    assert {getattr(config, "gamma", None) for config in gammas} == {1.0, 2.0}
 
 
 def test_run_json_has_the_grid_and_all_settings_of_every_point(swept: Path) -> None:
@@ -269,14 +284,6 @@ def test_a_plug_in_gets_the_settings_of_each_point(played: list[dict[str, Any]],
     assert main(["sweep", *TUNABLE, "--out", str(tmp_path / "run"), *words]) == 0
     found = [(item["detector"].threshold, item["config"].camera.crop) for item in played]
     assert found == list(product((0.2, 0.4), (300, 350)))
-
-
-def test_workers_play_the_same_sweep(swept: Path, tmp_path: Path) -> None:
-    words = [word if word != "0" else "1" for word in sweep(tmp_path / "w")]
-    assert main(words) in (0, 1)  # real episodes cannot be faked in another process; they are played
-    assert [line["suite"] for line in records_without_timing(tmp_path / "w")] == [
-        n for n in POINTS for _ in range(3)
-    ]
 
 
 def test_files_of_points_have_names_of_their_own() -> None:
