@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from statistics import mean
@@ -203,7 +203,7 @@ def drift_in(run: str, detector: str, controller: str, episode: int) -> float:
 def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
     """Return a cell of the table of the sticks of 2 mm, by the names that stand in it."""
     name = NAMES[detector]
-    measures = {
+    measures: dict[str, Callable[[str, str, str], Any]] = {
         "lifted %": success,
         "protective stops": stopped,
         "below 0.05": singular,
