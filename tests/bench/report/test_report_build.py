@@ -181,7 +181,7 @@ def test_objects_are_told_apart_and_refused_meshes_are_named(tmp_path: Path) -> 
 
 
 def test_a_table_with_objects_knocked_off_is_a_failure_and_says_how_many(tmp_path: Path) -> None:
-    off = {"outcome": "knocked_off", "knocked_off": ["mug", "jug"], "in_basket": ["pen"]}
+    off: dict[str, Any] = {"outcome": "knocked_off", "knocked_off": ["mug", "jug"], "in_basket": ["pen"]}
     run = make_run(tmp_path / "run", lines("0", time_limit_s=900.0, **off))
     write_report([run], run)
     (failures,) = [t for t in markdown_tables((run / "report.md").read_text()) if "what happened" in t[0]]
@@ -189,7 +189,7 @@ def test_a_table_with_objects_knocked_off_is_a_failure_and_says_how_many(tmp_pat
 
 
 def test_singular_stops_stand_in_brackets_behind_all(tmp_path: Path) -> None:
-    stop = {"outcome": "reflex", "reflex": stop_row()}
+    stop: dict[str, Any] = {"outcome": "reflex", "reflex": stop_row()}
     stopped = [
         changed(lines("0", min_singular_value=value, **stop)[0], episode=episode)
         for episode, value in enumerate((0.01, 0.04, 0.2))
