@@ -22,8 +22,9 @@ _SIDES = ("left", "right")
 FACE_COSINE = 0.5
 """A finger presses along the closing direction if the contact normal is within 60 degrees of it: wider than
 any friction cone here, and blind to what a tip stands on."""
-LEAST_FORCE = 1.0
-"""Force from either side below which even a feather is not held [N]."""
+LEAST_FORCE = 5.0
+"""Force from either side below which even a feather is not held [N]. Closed fingers press what lies between
+with the grip force, 30 N or more; a light object that hangs on them wedges itself with up to 1.4 N."""
 
 
 class FingerContacts:
