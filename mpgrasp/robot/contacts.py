@@ -1,7 +1,8 @@
 """Contacts of the gripper's fingers: the objects that they press, and those that they hold.
 
 Whole fingers count, not their pads alone: a roll of tape is clamped as well by the parts above the pads. What
-hangs on closed fingers, or lies wedged on their diagonals, is pressed by its own weight and by nothing else.
+hangs on closed fingers holds no finger back: the grip force goes into the fingers' own stops, however hard a
+shake has jammed it onto their diagonals.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ class FingerContacts:
         self._model, self._data, self._objects = model, data, tuple(objects)
         self._tcp = model.site(panda.PREFIX + "tcp").id
         self._wrench = np.zeros(6)
+        self._joints = [int(model.joint(panda.PREFIX + name).qposadr[0]) for name in panda.FINGER_JOINTS]
         bodies = [model.body(name).id for name in self._objects]
         fingers = [model.body(f"{panda.PREFIX}{side}_finger").id for side in _SIDES]
         self._object_of = _owners(model, bodies)[model.geom_bodyid]
@@ -71,10 +73,13 @@ class FingerContacts:
         return found
 
     def held(self) -> set[str]:
-        """Names of the objects that the fingers press from both sides, harder than their weight could.
+        """Names of the objects that hold the fingers apart, pressed from both sides harder than they weigh.
 
         That is at least the weight, but no less than `LEAST_FORCE` and no more than `hand.GRIPPER_FORCE_MIN`.
+        None is held by fingers that rest on their own stops.
         """
+        if self._data.qpos[self._joints].sum() <= 0:
+            return set()
         needed = dict(zip(self._objects, self._needed, strict=True))
         return {name for name, sides in self.forces().items() if sides.min() >= needed[name]}
 

@@ -140,11 +140,16 @@ def test_closing_beside_the_object_is_a_miss() -> None:
     assert result.width < 0.001
 
 
-def test_what_hangs_on_the_closed_fingers_like_a_ring_on_a_hook_is_not_grasped() -> None:
+@pytest.mark.parametrize(("mass", "friction"), [(0.03, 0.5), (0.2, 0.5), (0.2, 0.9)])
+def test_what_hangs_on_the_closed_fingers_like_a_ring_on_a_hook_is_not_grasped(
+    mass: float, friction: float
+) -> None:
     # a portal: the fingers straddle its beam and close in the opening below
     beam = Part(shape="box", size=(0.035, 0.008, 0.004), position=(0.0, 0.0, 0.066))
     posts = [Part(shape="box", size=(0.004, 0.008, 0.031), position=(x, 0.0, 0.031)) for x in (-0.031, 0.031)]
-    driver = driver_over(scene_with(stick(0.07, mass=0.03, parts=(beam, *posts), rolls=False), 0), z=0.3)
+    driver = driver_over(
+        scene_with(stick(0.07, mass=mass, friction=friction, parts=(beam, *posts), rolls=False), 0), z=0.3
+    )
     T = driver.simulation.object_pose("stick")
     angle = float(wrap_half_pi(np.arctan2(T[1, 1], T[0, 1])))
     grasp = Grasp(position=T[:3, 3] + [0.0, 0.0, 0.07], angle=angle, width=0.016, quality=1.0)

@@ -24,8 +24,11 @@ def place(sim: Simulation, name: str, position: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("force", [30.0, 70.0])
-def test_a_box_between_the_pads_is_pressed_with_the_grip_force_from_either_side(force: float) -> None:
-    size = (0.06, 0.03, 0.04)
+@pytest.mark.parametrize("width", [0.03, 0.001])
+def test_a_box_between_the_pads_is_pressed_with_the_grip_force_from_either_side(
+    force: float, width: float
+) -> None:
+    size = (0.06, width, 0.04)
     sim = Simulation(box_scene(size))
     grasp(sim, size, force)
     np.testing.assert_allclose(sim.finger_forces()["box_0"], [force, force], atol=1.0)
@@ -61,8 +64,11 @@ def test_a_finger_that_pushes_with_its_back_presses_outwards(shift: float) -> No
     assert sim.held() == set()
 
 
+@pytest.mark.parametrize("apart", [0.0, 0.002])
 @pytest.mark.parametrize("mass", [0.05, 0.3, 1.0])
-def test_what_lies_wedged_on_the_diagonals_is_pressed_by_its_weight_and_not_held(mass: float) -> None:
+def test_what_lies_wedged_on_the_diagonals_is_pressed_by_its_weight_and_not_held(
+    mass: float, apart: float
+) -> None:
     # a stirrup: its upper bar lies in the groove over the pads, its heavy lower one hangs below the tips
     stirrup = ObjectModel(
         name="stirrup",
@@ -76,7 +82,9 @@ def test_what_lies_wedged_on_the_diagonals_is_pressed_by_its_weight_and_not_held
     )
     sim = Simulation(build_scene(SceneConfig(objects=(stirrup,), cloth_unevenness=0.0), 0))
     put(sim, *CENTRE, 0.3)
-    sim.close_gripper()
+    sim.open_gripper(apart)
+    if not apart:
+        sim.close_gripper()
     sim.step(800)
     place(sim, "stirrup", sim.T_world_tcp[:3, 3] + [0.0, 0.0, 0.024 - hand.FINGERTIP_BEYOND_TCP])
     sim.step(1500)
