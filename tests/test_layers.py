@@ -17,7 +17,7 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "forking", "linear_algebra", "geometry", "paths", "outcome", "workspace",
+    "exceptions", "forking", "processes", "linear_algebra", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",
@@ -26,7 +26,7 @@ ORDER = (
     "controllers", "motion", "recording", "episode",
     "suite", "plugins", "settings", "env", "inspection",
     "training.data", "training",
-    "bench.record", "bench.processes", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
+    "bench.record", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
     "bench.playing", "bench.commands", "bench",
 )  # fmt: skip
 """Rooms of the house from the ground up: each may import what stands before it."""

@@ -7,7 +7,6 @@ library crashes or never ends is reported like any other that cannot be used.
 from __future__ import annotations
 
 import multiprocessing
-import signal
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -21,10 +20,10 @@ from rich.table import Table
 
 from mpgrasp.bench.meshes.check import MeshVerdict, examine, is_cached
 from mpgrasp.bench.meshes.files import ObjectFile, find_objects, label
-from mpgrasp.bench.processes import die_with_parent
 from mpgrasp.bench.report.terminal import wide_console
 from mpgrasp.bench.results.provenance import sha256
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.from_mesh import check_density, require_packages
 from mpgrasp.suite import Suite
@@ -169,7 +168,8 @@ class _Job:
         self.file = file
         self.connection, theirs = _context.Pipe(duplex=False)
         self._process = _context.Process(target=_work, args=(theirs, file, *arguments), daemon=True)
-        self._process.start()
+        with born_deaf():
+            self._process.start()
         theirs.close()  # or the end of the process would not be the end of the pipe
         self.deadline = time.monotonic() + TIME_LIMIT
 
@@ -196,8 +196,7 @@ class _Job:
 
 
 def _work(connection: Connection, file: ObjectFile, scene: SceneConfig, density: float) -> None:
-    # Ctrl-C reaches the whole process group; the parent decides what becomes of the others
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interrupts()
     threading.Thread(target=die_with_parent, daemon=True).start()
     connection.send(examine(file, scene, density))
 

@@ -12,7 +12,6 @@ from mpgrasp.bench.playing.description import describe
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.planning import make_plan
 from mpgrasp.bench.playing.player import EpisodeError, Player
-from mpgrasp.bench.processes import interrupts_wait
 from mpgrasp.bench.record import Line, Task, played
 from mpgrasp.bench.report.sweep import sweep_table
 from mpgrasp.bench.report.terminal import RunProgress, print_report_table, print_table, print_tests
@@ -20,6 +19,7 @@ from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
 from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.processes import interrupts_wait
 from mpgrasp.suite import Suite
 
 EXIT_BROKEN = 1

@@ -24,9 +24,9 @@ from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line
-from mpgrasp.bench.processes import die_with_parent
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
+from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
 
 HANG_AFTER: Mapping[str, float] = {"grasp": 600.0, "clear": 3600.0}
 """Wall-clock time that an episode may take unless told otherwise, by trial [s].
@@ -139,7 +139,8 @@ class _Worker:
         self._log, name = tempfile.mkstemp(prefix="mpgrasp-worker-", suffix=".log")
         self._log_name = Path(name)
         self._process = _context.Process(target=_work, args=(theirs, plan, run_episode, name), daemon=True)
-        self._process.start()
+        with born_deaf():
+            self._process.start()
         theirs.close()  # or the end of the worker would not be the end of the pipe
         self._limit = START_LIMIT
         self._trace = ""
@@ -194,8 +195,7 @@ def _cause(exitcode: int | None) -> str:
 
 def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str) -> None:
     """Play what the pipe brings, in a worker process, until the pipe ends."""
-    # Ctrl-C reaches the whole process group; the parent decides what becomes of its workers
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interrupts()
     threading.Thread(target=die_with_parent, daemon=True).start()
     with Path(log_name).open("w") as log:
         # open in both processes by now; unnamed, it cannot be left behind

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -14,6 +13,7 @@ import numpy as np
 
 from mpgrasp.camera.rasteriser import require_gl
 from mpgrasp.exceptions import CameraError, ConfigError, MpgraspError
+from mpgrasp.processes import born_deaf, end_by_interrupts
 from mpgrasp.training.data import shards
 from mpgrasp.training.data.data_card import write_data_card
 from mpgrasp.training.data.generate_config import GenerateConfig
@@ -77,7 +77,9 @@ def _written_by_workers(jobs: Sequence[Job], workers: int) -> Iterator[None]:
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _start_worker) as pool:
         try:
-            for written in as_completed([pool.submit(_write_shard, job) for job in jobs]):
+            with born_deaf():
+                written_shards = [pool.submit(_write_shard, job) for job in jobs]
+            for written in as_completed(written_shards):
                 yield written.result()
         except BrokenProcessPool:
             raise MpgraspError(
@@ -91,7 +93,7 @@ def _written_by_workers(jobs: Sequence[Job], workers: int) -> Iterator[None]:
 
 def _start_worker() -> None:
     cv2.setNumThreads(1)  # the workers fill the cores
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends them without a traceback each
+    end_by_interrupts()
 
 
 def _write_shard(job: Job) -> None:
