@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpgrasp.controllers.config import MVP_ROBUST, ReachConfig
+from mpgrasp.controllers.config import OPEN_LOOP, ReachConfig
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.grid_map import GridMap
 from mpgrasp.controllers.reaching import best_grasp_in_view
@@ -16,7 +16,7 @@ class OpenLoop:
     """Is done after its first view and never moves the arm."""
 
     name = "open_loop"
-    defaults = MVP_ROBUST
+    defaults = OPEN_LOOP
     reads = ("grid", "min_quality", "gripper_open")
     """Settings that have an effect on it."""
 
