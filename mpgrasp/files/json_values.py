@@ -10,6 +10,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 SIGNIFICANT_DIGITS = 9
@@ -17,7 +18,7 @@ SIGNIFICANT_DIGITS = 9
 
 
 def json_value(value: Any) -> Any:
-    """Return a JSON-ready copy: dataclasses and mappings as dicts, arrays, sequences and sets as lists.
+    """Return a JSON-ready copy: dataclasses, records and mappings as dicts, arrays, sequences and sets as lists.
 
     Keys keep their order, floats `SIGNIFICANT_DIGITS`; NaN and infinities become None. What JSON has no form
     for is given by the name of its class, which is the same in every process.
@@ -33,6 +34,8 @@ def json_value(value: Any) -> Any:
         return value.item()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: json_value(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, msgspec.Struct):
+        return json_value(msgspec.to_builtins(value))
     if isinstance(value, Mapping):
         return {str(json_value(key)): json_value(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

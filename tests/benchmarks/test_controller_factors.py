@@ -16,6 +16,7 @@ import pytest
 from factor_episodes import FACTORS, Study, Task, config_of
 from factorial import GENERATORS, LETTERS, alias_groups, design, interactions, main_effects
 
+import mpgrasp
 from mpgrasp.controllers.config import MVP, MVP_ROBUST
 from mpgrasp.geometry import FloatArray
 
@@ -166,6 +167,8 @@ def test_an_interrupted_study_goes_on_and_more_worlds_are_added(
         "run.json", "episodes.csv", "controller-factors.json", "controller-factors.csv",
         "controller-factors.png",
     }  # fmt: skip
+    made_with = json.loads((tmp_path / "run.json").read_text())["made_with"]
+    assert made_with["mpgrasp"] == mpgrasp.__version__
     quick.clear()
     assert controller_factors.main([*command, "--seed", "1"]) == 2
     assert not quick

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -21,6 +22,11 @@ from mpgrasp.outcome import Outcome
 class Point:
     x: float
     rest: Any = None
+
+
+class Row(msgspec.Struct, omit_defaults=True):
+    name: str
+    inner: Row | None = None
 
 
 @pytest.mark.parametrize(
@@ -38,6 +44,7 @@ class Point:
         (np.arange(3), [0, 1, 2]),
         (np.array(2.5), 2.5),
         (Outcome.SUCCESS, "success"),
+        (Row("a", Row("b")), {"name": "a", "inner": {"name": "b"}}),
         ({Outcome.SLIPPED: 1, 3: (1, 2)}, {"slipped": 1, "3": [1, 2]}),
         (MappingProxyType({"a": np.int64(1)}), {"a": 1}),
         (Counter("aab"), {"a": 2, "b": 1}),
