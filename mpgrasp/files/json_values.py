@@ -18,7 +18,7 @@ SIGNIFICANT_DIGITS = 9
 
 
 def json_value(value: Any) -> Any:
-    """Return a JSON-ready copy: dataclasses, records and mappings as dicts, arrays, sequences and sets as lists.
+    """Return a JSON-ready copy: dataclasses, records, mappings as dicts, arrays, sequences and sets as lists.
 
     Keys keep their order, floats `SIGNIFICANT_DIGITS`; NaN and infinities become None. What JSON has no form
     for is given by the name of its class, which is the same in every process.
