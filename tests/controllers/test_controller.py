@@ -107,6 +107,11 @@ def test_a_grasp_outside_of_the_workspace_is_never_taken(name: str, blob: Blob) 
         grasps.append(controller.final_grasp())
     for grasp in grasps:
         assert grasp is None or max(abs(grasp.position[0] - 0.5), abs(grasp.position[1])) <= 0.34
+    # the same object within the workspace is taken
+    controller = make_controller(name)
+    for _ in range(6):
+        controller.update(observe((0.45, 0.0, 0.4), replace(blob, x=0.5, y=0.0, radius=0.008)))
+    assert controller.final_grasp() is not None
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -116,6 +121,10 @@ def test_a_grasp_above_the_ceiling_or_below_the_table_is_never_taken(name: str) 
         view = flat_map(0.9, looking_down([0.5, 0, 0.463]), surface=surface)
         controller.update(observe((0.43, 0.0, 0.4), view))
         assert controller.final_grasp() is None
+    controller = make_controller(name)
+    view = flat_map(0.9, looking_down([0.5, 0, 0.463]), surface=0.05)
+    controller.update(observe((0.43, 0.0, 0.4), view))
+    assert controller.final_grasp() is not None
 
 
 @pytest.mark.parametrize("name", ALL)

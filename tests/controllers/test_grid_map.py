@@ -234,6 +234,16 @@ def test_a_remembered_failure_lowers_quality_around_it_only() -> None:
     assert np.hypot(*(best.position[:2] - [0.5, 0.0])) > 0.008
 
 
+def test_a_failure_fades_by_half_with_every_other_one() -> None:
+    grid = GridMap()
+    places = [np.array([0.4 + 0.05 * k, 0.0, 0.02]) for k in range(4)]
+    for place in places:
+        grid.suppress(place)
+    lowered = [float(grid.failures[cell_at(grid, *place[:2])]) for place in places]
+    assert lowered[-1] == pytest.approx(0.5, abs=0.06)
+    np.testing.assert_allclose(np.array(lowered[1:]) / lowered[:-1], 2.0, rtol=1e-3)
+
+
 @pytest.mark.parametrize(
     "settings",
     [

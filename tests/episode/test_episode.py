@@ -120,6 +120,19 @@ def test_noise_changes_from_tick_to_tick_but_not_between_looks_of_one_tick() -> 
     episode.close()
 
 
+def test_noise_of_one_episode_tells_nothing_of_that_of_another() -> None:
+    errors = []
+    for seed in (3, 4):
+        noisy, plain = start(seed), start(seed, noise=False)
+        errors.append(depth_of(noisy) - depth_of(plain))
+        noisy.close()
+        plain.close()
+    known = np.isfinite(errors[0]) & np.isfinite(errors[1])
+    one, other = (error[known] for error in errors)
+    assert min(one.std(), other.std()) > 1e-4
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.1
+
+
 def test_without_noise_a_tick_repeats_itself() -> None:
     episode = start(3, noise=False)
     first = depth_of(episode)
@@ -148,6 +161,8 @@ def test_the_camera_starts_above_the_jittered_centre_looking_straight_down() -> 
         offsets.append(T[:2, 3] - WORKSPACE_CENTRE)
         episode.close()
     assert np.abs(offsets).max() <= 0.1 + 1e-3
+    jitter = EpisodeConfig().start_jitter
+    assert 0.5 * jitter < np.std(offsets) < 1.5 * jitter  # each from a seed of its own
     # 24 draws of sigma 5 cm: the sample's deviation lies within 5 +- 2.5 cm
     assert 0.025 < np.std(offsets) < 0.075
 

@@ -3,7 +3,9 @@ from __future__ import annotations
 import errno
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +37,26 @@ def test_what_cannot_be_written_leaves_the_old_content_alone(
         replace_file(file, "new")
     assert file.read_text() == "old"
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_content_is_on_the_disk_before_it_takes_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[str] = []
+
+    def noted(name: str) -> Callable[..., None]:
+        real = getattr(os, name)
+
+        def step(*args: Any) -> None:
+            steps.append(name)
+            real(*args)
+
+        return step
+
+    for name in ("fsync", "replace"):
+        monkeypatch.setattr(os, name, noted(name))
+    replace_file(tmp_path / "a", "new")
+    assert steps[:2] == ["fsync", "replace"]
 
 
 def test_files_are_as_readable_as_any_other(tmp_path: Path) -> None:

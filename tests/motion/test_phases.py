@@ -14,7 +14,7 @@ from mpgrasp.geometry import FloatArray, looking_down
 from mpgrasp.grasp import Grasp
 from mpgrasp.motion.execution_config import ExecutionConfig
 from mpgrasp.motion.execution_state import ExecutionState, Phase
-from mpgrasp.motion.phases import PHASES, descend, pregrasp
+from mpgrasp.motion.phases import PHASES, descend, pregrasp, shake
 from mpgrasp.robot.hand import FINGERTIP_BEYOND_TCP
 
 GRASP = Grasp(position=np.array([0.5, 0.1, 0.06]), angle=0.0, width=0.03, quality=1.0)
@@ -29,6 +29,7 @@ class PlainDriver:
         self.touch = 0.0
         self.moves: list[tuple[float, float]] = []
         self.widths: list[float] = []
+        self.paths: list[FloatArray] = []
         self.simulation: Any = SimpleNamespace(
             time=0.0,
             scene=SimpleNamespace(objects=()),
@@ -54,7 +55,9 @@ class PlainDriver:
         return until is None or not until()
 
     def wait(self, *_: Any, **__: Any) -> None: ...
-    def follow(self, *_: Any, **__: Any) -> None: ...
+
+    def follow(self, path: Callable[[float], FloatArray], duration: float, _: Any = None) -> None:
+        self.paths.append(np.array([path(t) for t in np.linspace(0.0, duration, 500)]))
 
 
 def state_by(driver: PlainDriver, **changes: Any) -> ExecutionState:
@@ -83,6 +86,22 @@ def test_nothing_is_played_after_a_protective_stop() -> None:
     state = state_by(driver)
     state.play(phases)
     assert (played, state.phase) == (["descend"], "descend")
+
+
+def test_what_was_lifted_is_shaken_along_and_across_the_closing_direction_and_up_and_down() -> None:
+    assert list(PHASES) == ["pregrasp", "descend", "close", "lift", "hold", "shake"]
+    c = ExecutionConfig()
+    driver = PlainDriver()
+    shake(state_by(driver))
+    sideways, upright = driver.paths
+    for path in (sideways, upright):  # faded in and out: the whole amplitude is only nearly reached
+        assert 0.85 < np.linalg.norm(path, axis=1).max() / c.shake_amplitude <= 1.0
+        np.testing.assert_allclose(path[[0, -1]], 0.0, atol=1e-6)
+    along, across, up = np.abs(sideways).max(axis=0)
+    assert along == pytest.approx(across, rel=0.01)
+    assert along > 0.5 * c.shake_amplitude
+    assert up == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(upright[:, :2], 0.0, atol=1e-9)
 
 
 def test_the_tool_comes_down_onto_the_pregrasp_from_wherever_it_is() -> None:

@@ -34,6 +34,24 @@ def test_a_run_directory_holds_every_line_at_once(tmp_path: Path) -> None:
     assert read_run(directory.path) == RUN
 
 
+def test_every_line_is_on_the_disk_when_it_is_said_to_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    directory = RunDirectory.create(tmp_path, RUN)
+    real = os.fsync
+
+    def fsync(file: int) -> None:
+        real(file)
+        synced.append(os.fstat(file).st_size)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    for k in range(3):
+        directory.append(line_of(grasp_row(episode=k)))
+        assert synced[-1] == directory.episodes_file.stat().st_size
+    assert len(synced) == 3
+
+
 def test_the_traceback_of_an_error_lies_in_a_file_of_its_own(tmp_path: Path) -> None:
     directory = RunDirectory.create(tmp_path, RUN)
     directory.append(line_of(error_row(traceback="line 1\nline 2\n")))
