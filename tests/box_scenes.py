@@ -13,6 +13,7 @@ from mpgrasp.paths import SCENES
 from mpgrasp.robot import hand, panda
 from mpgrasp.scene.objects.free_body import SOLIMP, SOLREF
 from mpgrasp.scene.simulation import SERVO_PERIOD, Simulation
+from mpgrasp.scene.solver import NO_SLIP_ITERATIONS, NO_SLIP_TOLERANCE
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 CENTRE = (0.5, 0.0)
@@ -23,6 +24,7 @@ def box_scene(*sizes: tuple[float, float, float], mass: float = 0.05, robot: boo
     spec = mujoco.MjSpec.from_file(str(SCENES / "table.xml"))
     if robot:
         spec.attach(panda.panda_spec(), prefix=panda.PREFIX, frame=spec.worldbody.add_frame())
+        spec.option.noslip_iterations, spec.option.noslip_tolerance = NO_SLIP_ITERATIONS, NO_SLIP_TOLERANCE
     names = tuple(f"box_{k}" for k in range(len(sizes)))
     for k, (name, size) in enumerate(zip(names, sizes, strict=True)):
         body = spec.worldbody.add_body(name=name, pos=[CENTRE[0], CENTRE[1] + 0.12 * k, size[2] / 2])

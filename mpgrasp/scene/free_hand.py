@@ -19,7 +19,8 @@ from mpgrasp.linear_algebra import norm
 from mpgrasp.robot import hand, panda
 from mpgrasp.scene.moving_scene import MovingScene
 from mpgrasp.scene.objects.model import OBJECT_GROUP
-from mpgrasp.scene.scene import SLEEP_TOLERANCE, STATE, Scene
+from mpgrasp.scene.scene import STATE, Scene
+from mpgrasp.scene.solver import set_in_motion
 
 JOINTS = ("x", "y", "z", "yaw")
 """World position of the tool point [m] and heading of the hand's x axis about world z [rad]."""
@@ -196,8 +197,7 @@ def _with_hand(scene: Scene) -> Scene:
         # what nothing touches stays as it lies and costs nothing
         spec.body(name).sleep = mujoco.mjtSleepPolicy.mjSLEEP_INIT
     add_free_hand(spec)
-    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    spec.option.sleep_tolerance = SLEEP_TOLERANCE
+    set_in_motion(spec)
     model = spec.compile()
     before = scene.data()
     for name in scene.objects:
