@@ -3,33 +3,127 @@
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import sys
 from collections.abc import Callable
-from typing import NoReturn
+from ctypes.util import find_library
+from pathlib import Path
+from typing import Any, NoReturn
 
 from mpgrasp.exceptions import ConfigError, MpgraspError
+from mpgrasp.names import printable
 
 EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
 
 
+GL_BACKENDS = ("", "egl", "osmesa", "glfw", "glx", "wgl", "cgl", "enable", "enabled", "on", "true", "1",
+               "disable", "disabled", "off", "false", "0")  # fmt: skip
+"""What MuJoCo takes for MUJOCO_GL."""
+LARGEST = 2**63 - 1
+"""Largest whole number of an option."""
+
+
 class Parser(argparse.ArgumentParser):
-    """Raises ConfigError where argparse would print its usage and exit."""
+    """Raises ConfigError where argparse would print its usage and exit.
+
+    Options of `type=int`, `float` and `Path` take numbers and names that a program can do something with:
+    whole ones of 64 bits, finite ones, and paths that are not empty.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        for kind, read in ((int, whole(-LARGEST, LARGEST)), (float, number(-1e12, 1e12)), (Path, _path)):
+            self.register("type", kind, read)
 
     def error(self, message: str) -> NoReturn:
-        raise ConfigError(message, allowed=f"see {self.prog} --help")
+        raise ConfigError(message, allowed=None if "; allowed: " in message else f"see {self.prog} --help")
+
+
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """Return a reader of whole numbers from low to high, for the `type` of an option."""
+
+    def read(text: str) -> int:
+        try:
+            value = int(text) if len(text) < 100 else None
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            words = f"{low} to {high}" if high < LARGEST else f"{low} or more" if low >= 0 else "a whole one"
+            raise argparse.ArgumentTypeError(f"unusable number; got {text[:40]!r}; allowed: {words}")
+        return value
+
+    return read
+
+
+def number(low: float, high: float, unit: str = "", *, above: bool = False) -> Callable[[str], float]:
+    """Return a reader of numbers from low to high, for the `type` of an option; `above`: more than low."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (low < value if above else low <= value) or not value <= high:
+            words = f"{'more than ' if above else ''}{low:g} to {high:g}{f' {unit}' if unit else ''}"
+            raise argparse.ArgumentTypeError(f"unusable number; got {text[:40]!r}; allowed: {words}")
+        return value
+
+    return read
+
+
+def _path(text: str) -> Path:
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"unusable path; got {text!r}; allowed: a name, or . for here")
+    return Path(text)
 
 
 def run_command(command: Callable[[], int]) -> int:
-    """Run a command and return its exit code: its own, 2 and one line for unusable input, 130 for Ctrl-C."""
+    """Run a command and return its exit code: its own, 2 and one line for unusable input, 130 for Ctrl-C.
+
+    What the system refuses, such as a name that is too long or a full disk under standard output, is unusable
+    input too.
+    """
     try:
-        return command()
+        check_gl()
+        code = command()
+        sys.stdout.flush()
     except MpgraspError as error:
         print_error(error)
         return EXIT_BAD_INPUT
+    except OSError as error:
+        _give_up_stdout()
+        where = "" if error.filename is None else f"; got {error.filename!r}"
+        print_error(MpgraspError(f"the system refused: {error.strerror or error}{where}"))
+        return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
+    return code
+
+
+def check_gl() -> None:
+    """Raise ConfigError where MUJOCO_GL is such that MuJoCo could not even be imported."""
+    asked = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if asked not in GL_BACKENDS:
+        raise ConfigError(
+            "unusable environment variable MUJOCO_GL", got=asked, allowed="egl, osmesa, glfw, or unset"
+        )
+    if asked == "osmesa" and not any(map(find_library, ("OSMesa", "OSMesa.so.8"))):
+        raise ConfigError(
+            "MUJOCO_GL asks for OSMesa, which is not installed",
+            got=asked,
+            allowed="egl or unset, or install libosmesa6; the camera can ray-cast with MUJOCO_GL=disable",
+        )
+
+
+def _give_up_stdout() -> None:
+    """Keep the interpreter from complaining, at its end, about what standard output did not take."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def print_error(error: MpgraspError) -> None:
     """Say on stderr, in one line, what is wrong."""
-    print("mpgrasp: error:", " ".join(str(error).splitlines()), file=sys.stderr)
+    print("mpgrasp: error:", printable(" ".join(str(error).splitlines())), file=sys.stderr)

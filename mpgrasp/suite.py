@@ -21,8 +21,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import AssetError, ConfigError
+from mpgrasp.files.regular import read_regular
 from mpgrasp.files.settings import from_table, merged, refuse_unknown
+from mpgrasp.names import check_name, printable
 from mpgrasp.paths import BENCHMARKS
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ METHOD_GROUPS = ("controller", "detector")
 """Groups of settings that belong to what plays."""
 GROUPS = ("scene", "episode", *EPISODE_GROUPS, *METHOD_GROUPS)
 """Groups of settings, each a table of a suite."""
+_LARGEST = 1.0  # MB of a declaration
 _POINT = re.compile(r"(.+?)\[.+=.+\]")
 CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
 """Settings of an episode that no suite decides, and what decides them."""
@@ -162,13 +165,17 @@ def load_suite(name: str) -> Suite:
     else:
         raise ConfigError("unknown suite", got=name, allowed=[*suite_names(), "a path that ends in .toml"])
     try:
-        declared = tomllib.loads(path.read_text(encoding="utf-8"))
+        declared = tomllib.loads(read_regular(path, _LARGEST).decode("utf-8"))
     except OSError as error:
         raise ConfigError(
             "unreadable suite", got=name, allowed=f"a readable file ({error.strerror})"
         ) from error
     except ValueError as error:  # TOMLDecodeError, UnicodeDecodeError
         raise ConfigError("suite is not valid TOML", got=name, allowed=f"TOML 1.0 ({error})") from error
+    try:
+        check_name(path.stem)
+    except AssetError as error:
+        raise ConfigError("unusable name of a suite", got=printable(name), allowed=str(error)) from None
     return parse_suite(path.stem, declared)
 
 
@@ -190,6 +197,8 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
         )
         for turn in found.turns
     )
+    if not all(scene.objects for scene in scenes):
+        raise ConfigError(f"{where}: a scene without objects", got="objects = []", allowed="one or more")
     suite = Suite(
         name=name,
         title=found.title,
@@ -234,12 +243,16 @@ class _Box:
 
     def as_object(self) -> ObjectModel:
         """Return the box as an object that a scene can hold."""
-        from mpgrasp.scene.objects.model import ObjectModel, Part
+        from mpgrasp.scene.objects.model import ObjectModel, Part, check_density
 
+        check_density(self.density)
         x, y, z = self.box
-        part = Part(shape="box", size=(x / 2, y / 2, z / 2))
-        mass = self.density * part.volume
-        return ObjectModel(name=self.name, parts=(part,), mass=mass, provenance="its suite")
+        try:
+            part = Part(shape="box", size=(x / 2, y / 2, z / 2))
+            mass = self.density * part.volume
+            return ObjectModel(name=self.name, parts=(part,), mass=mass, provenance="its suite")
+        except AssetError as error:
+            raise ConfigError(error) from None
 
 
 def _with_objects(scene: Mapping[str, Any], where: str) -> dict[str, Any]:

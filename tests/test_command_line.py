@@ -60,5 +60,5 @@ def test_what_is_no_error_of_ours_is_not_swallowed() -> None:
 def test_subcommands_complain_like_their_command() -> None:
     parser = Parser(prog="tool")
     parser.add_subparsers(dest="command").add_parser("part").add_argument("--n", type=int)
-    with pytest.raises(ConfigError, match=r"invalid int value: 'x'; allowed: see tool part --help"):
+    with pytest.raises(ConfigError, match=r"argument --n: unusable number; got 'x'; allowed: a whole one$"):
         parser.parse_args(["part", "--n", "x"])

@@ -57,6 +57,11 @@ def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
     assert (suite.name, suite.title, suite.scene.objects) == ("mine", "Mine", ("key",))
 
 
+def boxed(**changes: Any) -> dict[str, Any]:
+    """A scene of one box."""
+    return {"scene": {"objects": [{"name": "b", "box": [0.05, 0.02, 0.02], **changes}]}}
+
+
 @pytest.mark.parametrize(
     ("declared", "message"),
     [
@@ -88,6 +93,19 @@ def test_suite_can_be_a_file_of_ones_own(tmp_path: Path) -> None:
             "objects, box is unusable; got .0.1, 0.1.; allowed: a list of 3, each a number",
         ),
         (MINIMAL | {"scene": {"objects": [{"name": "b"}]}}, "objects, box is missing"),
+        (MINIMAL | {"scene": {"objects": []}}, "a scene without objects"),
+        (
+            MINIMAL | {"scene": {"objects": ["key"] * 10_000}},
+            "too many objects; got 10000",
+        ),
+        (MINIMAL | boxed(name="world"), "reserved name of an object; got 'world'"),
+        (MINIMAL | boxed(name="a/b"), "unusable name of an object; got 'a/b'"),
+        (MINIMAL | boxed(name="\x1b[31m"), r"unusable name of an object; got '\\\\x1b\[31m'"),
+        (MINIMAL | boxed(density=1e-6), "density out of range"),
+        (MINIMAL | boxed(box=[1e-9] * 3), "unusable mass"),
+        (MINIMAL | boxed(box=[0.05, 0.05, 1e-4]), "too small"),
+        (MINIMAL | boxed(box=[0.05, 0.05, -0.02]), "unusable size of a box"),
+        (MINIMAL | boxed(box=[0.5, 0.02, 0.02]), "too large"),
         (
             MINIMAL | {"scene": {"objects": [{"edges": []}]}},
             "objects: unknown key; got 'edges'; allowed: box, name, density",

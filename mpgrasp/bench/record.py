@@ -141,6 +141,12 @@ class Reach(Record, frozen=True, kw_only=True):
     blind_drift_m: float | None
     grasp: ExecutedGrasp | None
 
+    def __post_init__(self) -> None:
+        if self.success != (self.outcome is Outcome.SUCCESS):
+            raise ValueError(f"outcome {self.outcome.value!r} beside success {self.success}")
+        if self.ticks < 0 or not self.sim_time_s >= 0:
+            raise ValueError("a time or a number of ticks below 0")
+
 
 class Pick(Reach, frozen=True, kw_only=True):
     """One attempt of a clearing."""

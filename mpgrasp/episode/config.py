@@ -16,6 +16,14 @@ from mpgrasp.motion.trajectory import MotionConfig
 FER_REFLEXES = ReflexConfig()
 """Bounds of the FER: one object, because configs that hold arrays are equal only to themselves."""
 
+_RANGES = {
+    "control_dt": (0.002, 2.0),
+    "start_height": (0.05, 1.0),
+    "max_reach_time": (0.1, 3600.0),
+    "start_jitter": (0.0, 0.5),
+}
+"""Least and greatest value of settings, in their units; what lies outside can only be a slip."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class EpisodeConfig:
@@ -51,11 +59,11 @@ class EpisodeConfig:
     """Bounds of the protective stops."""
 
     def __post_init__(self) -> None:
-        for name in ("control_dt", "start_height", "max_reach_time"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive", got=getattr(self, name))
-        if not self.start_jitter >= 0:
-            raise ConfigError("start_jitter must not be negative", got=self.start_jitter)
+        for name, (low, high) in _RANGES.items():
+            if not low <= getattr(self, name) <= high:
+                raise ConfigError(
+                    f"{name} out of range", got=getattr(self, name), allowed=f"{low:g} to {high:g}"
+                )
         if self.start_radius is not None and not 0 <= self.start_radius <= 0.5:
             raise ConfigError("start_radius", got=self.start_radius, allowed="0 to 0.5 [m], or none")
         if self.camera_backend not in BACKENDS:

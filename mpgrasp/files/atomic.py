@@ -14,13 +14,13 @@ def replace_file(file: Path, content: str | bytes) -> None:
 
     Args:
         file: in a folder that exists.
-        content: all of it; text is written as UTF-8.
+        content: all of it; text is written as UTF-8, parts of file names that have no form in it escaped.
 
     Raises:
         OSError: it cannot be written. What was there before is still there, and nothing else is.
     """
     with replacing(file) as temporary, temporary.open("xb") as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
+        stream.write(content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace"))
 
 
 @contextmanager

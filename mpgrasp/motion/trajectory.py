@@ -11,6 +11,9 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, rotation_vector, transform
 from mpgrasp.linear_algebra import norm, product
 
+DT = (0.002, 0.05)
+"""Shortest and longest period of the velocity loop [s]: a step of the simulation, and 20 Hz."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MotionConfig:
@@ -48,6 +51,8 @@ class MotionConfig:
         ):  # fmt: skip
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive", got=getattr(self, name))
+        if not DT[0] <= self.dt <= DT[1]:
+            raise ConfigError("dt out of range", got=self.dt, allowed=f"{DT[0]:g} to {DT[1]:g} [s]")
         if not 0 < self.joint_fraction <= 1:
             raise ConfigError("joint_fraction is a share", got=self.joint_fraction, allowed="(0, 1]")
         if not self.max_slowdown >= 1:

@@ -11,6 +11,9 @@ from mpgrasp.exceptions import ConfigError
 from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.workspace import WORKSPACE_CENTRE
 
+MAX_OBJECTS = 40
+"""Most objects of a scene: the paper clears ten, and contacts grow with their number."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SceneConfig:
@@ -56,6 +59,8 @@ class SceneConfig:
         for name in ("objects", "centre", "jitter"):  # declarations give lists
             object.__setattr__(self, name, tuple(getattr(self, name)))
         object.__setattr__(self, "pattern", tuple(tuple(place) for place in self.pattern))
+        if (n := len(self.objects) if self.count is None else self.count) > MAX_OBJECTS:
+            raise ConfigError("too many objects", got=n, allowed=f"up to {MAX_OBJECTS}")
         if self.count is not None and not 1 <= self.count <= len(self.objects):
             raise ConfigError(
                 "unusable count of objects", got=self.count, allowed=f"1 to {len(self.objects)}"

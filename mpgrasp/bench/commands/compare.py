@@ -228,7 +228,7 @@ def _table(rows: Sequence[Comparison]) -> Table:
         found = row.pairing
         table.add_row(
             escape(" / ".join(dict.fromkeys((row.a.suite, row.b.suite)))),
-            str(row.a.method), str(row.b.method), str(found.n),
+            escape(str(row.a.method)), escape(str(row.b.method)), str(found.n),
             *([f"{found.errors_a}, {found.errors_b}"] if errors else []),
             _number(100 * found.rate_a), _number(100 * found.rate_b), str(found.a_alone), str(found.b_alone),
             _number(row.p_success, ".3g"), _time(found), *(_clearing(row) if times else []),

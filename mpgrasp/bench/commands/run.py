@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.command_line import Parser
+from mpgrasp.command_line import LARGEST, Parser, number, whole
 from mpgrasp.exceptions import ConfigError
 
 _EPILOG = """\
@@ -38,6 +38,12 @@ hand; --resume plays those and the rest, and tries error rows again.
 exit code: 0 all episodes played, 1 some could not be played, 2 unusable input or output, 130 interrupted
 (Ctrl-C); finished episodes are kept in every case.
 """
+
+MOST_EPISODES = 100_000
+"""Most episodes of each combination: days of work for a hundred cores."""
+MOST_WORKERS = 256
+LONGEST = 7 * 24 * 3600.0
+"""Longest wall-clock time of an episode that can be waited for [s]: a week."""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -87,20 +93,20 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--episodes",
         metavar="N",
-        type=int,
+        type=whole(1, MOST_EPISODES),
         help="episodes of each combination (default: what the suite declares, the paper's number)",
     )
     add(
         "--until-ci",
         metavar="W",
-        type=float,
+        type=number(0, 100, "percentage points", above=True),
         help="go on in batches of N episodes until every 95 %% interval is narrower than W points "
         "(stopping by the result makes intervals slightly too narrow)",
     )
     add(
         "--max-episodes",
         metavar="M",
-        type=int,
+        type=whole(1, MOST_EPISODES),
         default=1000,
         help="where --until-ci ends in any case (default: 1000)",
     )
@@ -117,12 +123,12 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--density",
         metavar="D",
-        type=float,
+        type=number(1, 25000, "kg/m^3"),
         default=500.0,
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
     add_settings(parser)
-    add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
+    add("--seed", metavar="S", type=whole(0, LARGEST), default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
     add(
         "--resume",
@@ -134,7 +140,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--record",
         metavar="N",
-        type=int,
+        type=whole(0, MOST_EPISODES),
         default=0,
         help="record the first N episodes of each combination, for rerun, as GIF and as MP4 (default: 0)",
     )
@@ -162,14 +168,14 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--workers",
         metavar="K",
-        type=int,
+        type=whole(0, MOST_WORKERS),
         default=len(os.sched_getaffinity(0)),
         help="play in K processes (default: one per core); 0 plays in this one, for debuggers",
     )
     add(
         "--hang-after",
         metavar="S",
-        type=float,
+        type=number(0, LONGEST, "s", above=True),
         help="seconds after which an episode's process is taken for hung (default: "
         f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )

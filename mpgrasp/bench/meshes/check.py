@@ -11,7 +11,9 @@ import hashlib
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
+import msgspec
 import mujoco
 
 import mpgrasp
@@ -24,7 +26,7 @@ from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.files.cache import load_result, store_result
 from mpgrasp.files.json_values import json_value
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.objects.from_mesh import mesh_key, read_body
+from mpgrasp.scene.objects.from_mesh import CachedBody, mesh_key, read_body
 from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.scene import build_scene
 
@@ -34,6 +36,10 @@ SOME_GRASP = 0.1
 """Quality of the best grasp above which the hand can close on an object: no controller attempts less."""
 SURE_GRASP = 0.5
 """The same where every pose must offer one."""
+
+
+class _CachedPoses(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    qualities: tuple[Annotated[float, msgspec.Meta(ge=0, le=1)] | None, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,19 +105,24 @@ def is_cached(file: ObjectFile, scene: SceneConfig, density: float) -> bool:
         key = mesh_key(file.path)
     except AssetError:
         return True
-    mesh = load_result("meshes", key)
+    mesh = load_result("meshes", key, CachedBody)
     return mesh is not None and (
-        "refused" in mesh or load_result("rest_poses", _poses_key(key, scene, density)) is not None
+        mesh.refused is not None or _cached_poses(_poses_key(key, scene, density)) is not None
     )
 
 
 def _best_grasps(model: ObjectModel, scene: SceneConfig, key: str) -> tuple[float | None, ...]:
-    known = load_result("rest_poses", key)
+    known = _cached_poses(key)
     if known is None:
         config = replace(scene, objects=(model,), count=None)
-        known = {"qualities": [_best_grasp(config, seed) for seed in range(REST_POSES)]}
+        known = _CachedPoses(qualities=tuple(_best_grasp(config, seed) for seed in range(REST_POSES)))
         store_result("rest_poses", key, known)
-    return tuple(known["qualities"])
+    return known.qualities
+
+
+def _cached_poses(key: str) -> _CachedPoses | None:
+    known = load_result("rest_poses", key, _CachedPoses)
+    return known if known is not None and len(known.qualities) == REST_POSES else None
 
 
 def _best_grasp(config: SceneConfig, seed: int) -> float | None:

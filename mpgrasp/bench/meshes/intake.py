@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection, wait
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -23,9 +24,11 @@ from mpgrasp.bench.meshes.files import ObjectFile, find_objects, label
 from mpgrasp.bench.report.terminal import wide_console
 from mpgrasp.bench.results.provenance import sha256
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.names import printable
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.objects.from_mesh import check_density, require_packages
+from mpgrasp.scene.objects.from_mesh import require_packages
+from mpgrasp.scene.objects.model import check_density
 from mpgrasp.suite import Suite
 
 TIME_LIMIT = 900.0
@@ -84,11 +87,11 @@ def print_verdicts(verdicts: Sequence[MeshVerdict], console: Console | None = No
             edges = " x ".join(f"{1000 * edge:.0f}" for edge in model.size)
             columns = [edges, f"{1000 * model.mass:.0f}", str(len(model.parts))]
         table.add_row(
-            verdict.name,
+            escape(verdict.name),
             "yes" if verdict.accepted else "no",
             *columns,
             _spread([quality or 0.0 for quality in verdict.qualities]),
-            verdict.reason or "",
+            escape(printable(verdict.reason or "")),
         )
     used = sum(verdict.accepted for verdict in verdicts)
     wide_console(console).print(f"Objects: {used} of {len(verdicts)} are used", table, sep="\n")

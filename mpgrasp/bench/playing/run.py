@@ -20,7 +20,7 @@ from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.processes import interrupts_wait
-from mpgrasp.suite import Suite
+from mpgrasp.suite import Suite, episode_seed
 
 EXIT_BROKEN = 1
 
@@ -82,6 +82,7 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
     on the number of workers, nor on where a run was interrupted.
     """
     before = directory.episodes()
+    _refuse_others(plan, directory, before)
     progress.start(before)
     done = {line.task for line in played(before)}
 
@@ -112,6 +113,23 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
             )
         expected += stop * len(plan.methods)
     return True
+
+
+def _refuse_others(plan: Plan, directory: RunDirectory, lines: Sequence[Line]) -> None:
+    """Raise OutputError where a line is of no episode of the plan."""
+    suites = {suite.name: suite for suite in plan.suites}
+    for line in lines:
+        suite, method = suites.get(line.suite), line.task.cell.method
+        if suite is not None and method in plan.methods and line.seed == plan.seed:
+            limit = plan.batch(suite) if plan.until_ci is None else plan.max_episodes
+            world = episode_seed(line.suite, line.seed, line.episode) if 0 <= line.episode < limit else None
+            if line.scene_seed == world:
+                continue
+        raise OutputError(
+            f"a line of {directory.episodes_file.name} is of no episode of this run",
+            got=f"{line.task}, seed {line.seed}, scene_seed {line.scene_seed}",
+            allowed="lines of this run alone; was the file edited?",
+        )
 
 
 def _narrow(plan: Plan, suite: Suite, lines: Sequence[Line], stop: int) -> bool:

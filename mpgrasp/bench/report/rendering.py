@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from mpgrasp.names import printable
+
 if TYPE_CHECKING:
     from mpgrasp.bench.report.build import Report
 
@@ -48,7 +50,7 @@ def anchor(title: str) -> str:
 
 def html(text: str) -> Markup:
     """Escaped text with its code marked up."""
-    pieces = _pieces(escape(text))
+    pieces = _pieces(escape(_visible(text)))
     return Markup("").join(
         Markup(f"<code>{piece}</code>" if k % 2 else piece) for k, piece in enumerate(pieces)
     )
@@ -56,7 +58,7 @@ def html(text: str) -> Markup:
 
 def markdown(text: str) -> Markup:
     """Text in one line of Markdown, in which there is no HTML but in code."""
-    said = text.unescape() if isinstance(text, Markup) else text
+    said = _visible(text.unescape() if isinstance(text, Markup) else text)
     pieces = _pieces(" ".join(line for row in said.splitlines() if (line := row.strip())))
     return Markup("`".join(piece if k % 2 else piece.replace("<", "&lt;") for k, piece in enumerate(pieces)))
 
@@ -65,6 +67,11 @@ def markdown_cell(text: str) -> Markup:
     """The same in a table, whose bars it must not add to."""
     # backslashes before a bar would take its own one away
     return Markup(re.sub(r"(\\*)\|", r"\1\1\\|", markdown(text)))
+
+
+def _visible(text: str) -> str:
+    """Text in which control characters of names are escaped, but for line ends."""
+    return text if isinstance(text, Markup) else "\n".join(map(printable, text.splitlines()))
 
 
 def _pieces(text: str) -> list[str]:

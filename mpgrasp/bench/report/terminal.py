@@ -23,6 +23,7 @@ from mpgrasp.bench.analysis.summary import CellSummary, ClearingCounts, PairedTe
 from mpgrasp.bench.record import ErrorLine, Line, played
 from mpgrasp.bench.report.document import Table as ReportTable
 from mpgrasp.bench.report.intervals import stops_text
+from mpgrasp.names import printable
 from mpgrasp.statistics import SIGNIFICANCE
 
 PIPED_WIDTH = 160
@@ -55,8 +56,8 @@ def result_table(cells: Sequence[CellSummary]) -> Table:
     for cell in cells:
         table.add_row(
             escape(cell.suite),
-            cell.detector,
-            cell.controller,
+            escape(cell.detector),
+            escape(cell.controller),
             str(cell.n),
             str(cell.successes),
             _number(cell.rate and 100 * cell.rate),
@@ -108,8 +109,8 @@ def print_tests(tests: Sequence[PairedTest], console: Console | None = None) -> 
     for test in tests:
         table.add_row(
             escape(test.suite),
-            " ".join(test.a),
-            " ".join(test.b),
+            escape(" ".join(test.a)),
+            escape(" ".join(test.b)),
             str(test.n),
             str(test.a_alone),
             str(test.b_alone),
@@ -197,14 +198,14 @@ class RunProgress:
 
     def note(self, text: str) -> None:
         """Say something out of the ordinary, even if quiet."""
-        self._console.out(f"mpgrasp: {' '.join(text.split())}", highlight=False)
+        self._console.out(f"mpgrasp: {printable(' '.join(text.split()))}", highlight=False)
 
     def add(self, line: Line) -> None:
         """One more episode is finished."""
         self._done += 1
         self._successes += bool(line.success)
         if self._bar:
-            cell = f"{escape(line.suite)} {line.detector} {line.controller}"
+            cell = escape(f"{line.suite} {line.detector} {line.controller}")
             self._bar.update(self._task, description=cell, completed=self._done, successes=self._successes)
         if isinstance(line, ErrorLine):
             self.note(f"error: {line.error}")
@@ -214,7 +215,7 @@ class RunProgress:
                 f"episode {line.episode}, {line.detector}, {line.controller}, {line.object}: "
                 f"{line.outcome} in {line.sim_time_s:.1f} s"
             )
-            self._console.out(text, highlight=False)
+            self._console.out(printable(text), highlight=False)
 
     def _time_left(self) -> str:
         pace = (time.monotonic() - self._start) / (self._done - self._before)

@@ -23,6 +23,7 @@ from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescrip
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.files.json_values import differences
+from mpgrasp.names import printable
 
 
 class RunDirectory:
@@ -230,6 +231,14 @@ class RunDirectory:
                 found = str(error)
         elif self.episodes_file.exists():
             found = "episodes.jsonl without a run.json"
+        # a kill may leave an unfinished run.json behind, under a hidden name
+        elif others := sorted(path.name for path in self.path.iterdir() if path.name[0] != "."):
+            shown = ", ".join(map(printable, others[:3])) + (", ..." if len(others) > 3 else "")
+            raise OutputError(
+                f"directory is not empty and holds no run ({shown})",
+                got=str(self.path),
+                allowed="a new or an empty directory",
+            )
         else:
             return
         if found:

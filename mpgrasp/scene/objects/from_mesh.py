@@ -16,15 +16,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.files.cache import load_result, store_result
+from mpgrasp.files.regular import read_regular
 from mpgrasp.geometry import FloatArray
 from mpgrasp.linear_algebra import product
-from mpgrasp.scene.objects.model import MAX_SIZE, ObjectModel, Part
+from mpgrasp.scene.objects.model import MAX_SIZE, ObjectModel, Part, check_density
+from mpgrasp.scene.objects.solids import require_together, share_of_union
 from mpgrasp.scene.objects.surface import (
     MAX_PATCH,
     MIN_SIZE,
@@ -41,6 +44,8 @@ FRICTION = 0.6
 TOLERANCE = 0.004
 """Distance by which the convex pieces may depart from the mesh [m]."""
 MAX_PIECES = 16
+MAX_SOLIDS = 32
+"""Most closed surfaces in one mesh: each is a body of its own, with contacts of its own."""
 MAX_FACES = 2500
 """A mesh with more is simplified before it is cut: CoACD's time grows with them."""
 MAX_VERTICES = 200
@@ -48,11 +53,26 @@ MAX_VERTICES = 200
 CONVEX_ENOUGH = 0.97
 """A piece that fills this share of its convex hull is taken to be its hull."""
 
+MAX_FILE = 200.0
+"""Largest file of a mesh [MB]: four million faces."""
+
 _COACD = {"max_convex_hull": MAX_PIECES, "resolution": 1000, "mcts_nodes": 12, "mcts_iterations": 40,
           "mcts_max_depth": 2, "preprocess_mode": "off", "seed": 0}  # fmt: skip
 _PACKAGES = ("coacd", "fast-simplification", "trimesh")
-_REVISION = 1  # raised whenever this module makes something else of the same mesh
-_DENSITIES = (1.0, 25000.0)  # [kg/m^3], foam to heavy metal
+_REVISION = 2  # raised whenever this module makes something else of the same mesh
+
+
+class CachedBody(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Content of a cache file: what came of a mesh."""
+
+    pieces: list[Annotated[list[tuple[float, float, float]], msgspec.Meta(min_length=4)]] = []
+    volume: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+    refused: str | None = None
+    """Reason why the mesh cannot be used; None if it can."""
+
+    def __post_init__(self) -> None:
+        if self.refused is None and not (self.pieces and self.volume > 0):
+            raise ValueError("neither a body nor a reason why there is none")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,13 +114,6 @@ class MeshBody:
         )
 
 
-def check_density(density: float) -> None:
-    """Raise ConfigError unless something may have this density [kg/m^3]."""
-    low, high = _DENSITIES
-    if not low <= density <= high:
-        raise ConfigError("density out of range [kg/m^3]", got=density, allowed=f"{low:g} to {high:g}")
-
-
 def require_packages() -> None:
     """Raise ConfigError unless all that reads and cuts meshes is installed."""
     missing = [name for name in _PACKAGES if importlib.util.find_spec(name.replace("-", "_")) is None]
@@ -138,24 +151,22 @@ def read_body(path: Path) -> MeshBody:
     """
     require_packages()
     key = mesh_key(path)
-    result = load_result("meshes", key)
+    result = load_result("meshes", key, CachedBody)
     if result is None:
         try:
             pieces, volume = _make_body(load_surface(_content(path), path.suffix.lower()))
-            result = {"pieces": [piece.tolist() for piece in pieces], "volume": volume}
+            result = CachedBody(pieces=[piece.tolist() for piece in pieces], volume=volume)
         except AssetError as error:
-            result = {"refused": str(error)}
+            result = CachedBody(refused=str(error))
         store_result("meshes", key, result)
-    if "refused" in result:
-        raise AssetError(result["refused"])
-    return MeshBody(
-        pieces=tuple(np.array(piece) for piece in result["pieces"]), volume=float(result["volume"]), key=key
-    )
+    if result.refused is not None:
+        raise AssetError(result.refused)
+    return MeshBody(pieces=tuple(np.array(piece) for piece in result.pieces), volume=result.volume, key=key)
 
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path, MAX_FILE)
     except OSError as error:
         raise AssetError("unreadable file", allowed=f"a readable one ({error.strerror})") from None
 
@@ -167,10 +178,16 @@ def _make_body(mesh: Any) -> tuple[list[FloatArray], float]:
         for shell in shells:
             shell.invert()
     solids = [shell for shell in shells if shell.volume > 0]  # the others bound hollows nobody gets to
-    pieces = [_thinned(piece) for solid in solids for piece in _cut(solid)]
+    if len(solids) > MAX_SOLIDS:
+        raise AssetError("mesh is of many bodies", got=len(solids), allowed=f"up to {MAX_SOLIDS}")
+    cut = [[_thinned(piece) for piece in _cut(solid)] for solid in solids]
+    require_together(cut)
+    # solids that lie in one another take up their common space once
+    volume = float(sum(solid.volume for solid in solids)) * share_of_union(cut)
+    pieces = [piece for of_solid in cut for piece in of_solid]
     points = np.vstack(pieces)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    return [piece - centre for piece in pieces], float(sum(solid.volume for solid in solids))
+    return [piece - centre for piece in pieces], volume
 
 
 def _cut(solid: Any) -> list[FloatArray]:

@@ -12,13 +12,21 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from mpgrasp.exceptions import AssetError
+from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.geometry import FloatArray, rotation_from_quaternion, transform, transform_points
+from mpgrasp.names import check_name
 
 OBJECT_GROUP = 1
 """Geom group of all objects: height maps cast their rays at this group alone."""
 MAX_SIZE = 0.3
 """Largest edge of an object's bounding box [m]; anything above was most likely saved in millimetres."""
+MIN_EDGE = 2e-4
+"""Smallest edge of an object's bounding box [m]; contacts give way by as much."""
+MASSES = (1e-5, 100.0)
+"""Least and greatest mass of an object [kg]: a crumb of foam, and thirty times what the arm carries."""
+
+DENSITIES = (1.0, 25000.0)
+"""Least and greatest density of an object [kg/m^3], foam to heavy metal."""
 
 _SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "mesh": 0}
 """Number of half sizes of each shape."""
@@ -137,12 +145,15 @@ class ObjectModel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))
-        if not self.name or "/" in self.name:
-            raise AssetError("unusable name of an object", got=self.name, allowed="non-empty, without '/'")
+        check_name(self.name)
         if not self.parts:
             raise AssetError(f"object {self.name} is empty", got="no parts", allowed="at least one part")
-        if not 0 < self.mass < np.inf:
-            raise AssetError(f"unusable mass of object {self.name} [kg]", got=self.mass, allowed="above 0")
+        if not MASSES[0] <= self.mass <= MASSES[1]:
+            raise AssetError(
+                f"unusable mass of object {self.name} [kg]",
+                got=float(f"{self.mass:.3g}"),
+                allowed=f"{MASSES[0]:g} to {MASSES[1]:g}",
+            )
         if not 0 < self.friction < np.inf:
             raise AssetError(f"unusable friction of object {self.name}", got=self.friction, allowed="above 0")
         if np.shape(self.rgba) != (4,):
@@ -157,6 +168,12 @@ class ObjectModel:
             )
         if self.volume <= 0:
             raise AssetError(f"object {self.name} has no volume", got=self.volume)
+        if min(self.size) < MIN_EDGE:
+            raise AssetError(
+                f"object {self.name} is too small [m]",
+                got=float(f"{min(self.size):.3g}"),
+                allowed=f"edges of {MIN_EDGE} m or more",
+            )
 
     @cached_property
     def points(self) -> FloatArray:
@@ -173,3 +190,10 @@ class ObjectModel:
     def volume(self) -> float:
         """Sum over the parts [m^3]; overlaps count twice."""
         return sum(part.volume for part in self.parts)
+
+
+def check_density(density: float) -> None:
+    """Raise ConfigError unless something may have this density [kg/m^3]."""
+    low, high = DENSITIES
+    if not low <= density <= high:
+        raise ConfigError("density out of range [kg/m^3]", got=density, allowed=f"{low:g} to {high:g}")

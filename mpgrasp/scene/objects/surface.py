@@ -37,6 +37,10 @@ def load_surface(content: bytes, suffix: str) -> Any:
     empty = AssetError("mesh is empty", allowed="at least 4 vertices and their faces")
     if not content.strip():
         raise empty
+    if suffix == ".stl":
+        _check_stl(content)
+    else:
+        content = _as_utf8(content, suffix)
     try:
         loaded = trimesh.load(io.BytesIO(content), file_type=suffix[1:], force="mesh")
     except Exception as error:  # each file type fails in its own way
@@ -54,6 +58,33 @@ def load_surface(content: bytes, suffix: str) -> Any:
         raise empty
     _check_size(float(mesh.extents.max()))
     return mesh
+
+
+def _check_stl(content: bytes) -> None:
+    """Raise AssetError unless the content has the length that a binary STL says it has, or is a text one."""
+    faces = int.from_bytes(content[80:84], "little")
+    if len(content) >= 84 and len(content) == 84 + 50 * faces:
+        return
+    if content.lstrip()[:5].lower() == b"solid" and b"\0" not in content:
+        if b"endsolid" in content.lower():
+            return
+        raise AssetError("text STL without its end", allowed="the whole file, up to endsolid")
+    raise AssetError(
+        "binary STL is cut off or too long",
+        got=f"{len(content)} bytes",
+        allowed=f"84 + 50 x {faces} = {84 + 50 * faces} by its own count of faces",
+    )
+
+
+def _as_utf8(content: bytes, suffix: str) -> bytes:
+    """Return the content of a text file in UTF-8, comments and names in Latin-1 included."""
+    end = content.find(b"end_header") if suffix == ".ply" else -1
+    head, rest = (content[:end], content[end:]) if end >= 0 else (content, b"")
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError:
+        head = head.decode("latin-1").encode("utf-8")
+    return head + rest
 
 
 def _check_size(edge: float) -> None:

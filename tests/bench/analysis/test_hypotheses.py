@@ -11,6 +11,7 @@ from toy_runs import lines
 from mpgrasp.bench.analysis.hypotheses import Verdict, evaluate
 from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Baseline, Claim, Measure, reported
 from mpgrasp.bench.record import by_cell, played
+from mpgrasp.outcome import Outcome
 
 
 def claim(measure: Measure = Measure.SUCCESS) -> Claim:
@@ -84,7 +85,7 @@ def test_times_are_compared_in_pairs_and_whoever_failed_took_the_limit() -> None
     assert found.p == pytest.approx(2 / 2**8)  # all eight signs alike
     assert found.verdict is Verdict.CONFIRMED
     assert found.worse - found.better == pytest.approx(1.0)
-    gave_up = [changed(line, success=False, sim_time_s=1.0) for line in fast]
+    gave_up = [changed(line, success=False, outcome=Outcome.TIMEOUT, sim_time_s=1.0) for line in fast]
     (found,) = evaluate(by_cell([*gave_up, *slow]), [claim(Measure.TIME)])
     assert found.better == 100.0
     assert found.verdict is Verdict.CONTRADICTED

@@ -8,6 +8,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Iterator
+from ctypes.util import find_library
 from pathlib import Path
 
 import fakes
@@ -70,14 +71,29 @@ def test_quiet_shows_the_table_alone(
         (["thin", "--detector", "resnet"], "unknown detector; got 'resnet'; allowed: dhrnet"),
         (["thin", "--detector", ""], "unknown detector"),
         (["thin", "--controller", "mppc,pid"], "unknown controller; got 'pid'; allowed: mppc"),
-        (["thin", *PLUG_INS, "--episodes", "0"], "episodes out of range; got 0"),
-        (["thin", *PLUG_INS, "--episodes", "many"], "invalid int value: 'many'"),
-        (["thin", *PLUG_INS, "--seed", "-1"], "seed out of range; got -1"),
-        (["thin", *PLUG_INS, "--workers", "-1"], "workers out of range; got -1"),
-        (["thin", *PLUG_INS, "--record", "-1"], "record out of range"),
+        (
+            ["thin", *PLUG_INS, "--episodes", "0"],
+            "--episodes: unusable number; got '0'; allowed: 1 to 100000",
+        ),
+        (
+            ["thin", *PLUG_INS, "--episodes", "many"],
+            "--episodes: unusable number; got 'many'; allowed: 1 to 100000",
+        ),
+        (["thin", *PLUG_INS, "--seed", "-1"], "--seed: unusable number; got '-1'; allowed: 0 or more"),
+        (["thin", *PLUG_INS, "--workers", "-1"], "--workers: unusable number; got '-1'; allowed: 0 to 256"),
+        (["thin", *PLUG_INS, "--record", "-1"], "--record: unusable number; got '-1'; allowed: 0 to 100000"),
         (["thin", *PLUG_INS, "--camera", "eye"], "unknown camera backend; got 'eye'; allowed: auto, gl, ray"),
         (["thin", *PLUG_INS, "--weights", "absent.pt"], "no such weights file; got 'absent.pt'"),
         (["thin", "--detector", "fakes:NotADetector"], "lacks reset, predict"),
+        (["thin", *PLUG_INS, "--episodes", "9" * 20], "--episodes: unusable number"),
+        (["thin", *PLUG_INS, "--seed", "9" * 20], "--seed: unusable number"),
+        (["thin", *PLUG_INS, "--hang-after", "inf"], "--hang-after: unusable number"),
+        (["thin", *PLUG_INS, "--hang-after", "1e300"], "--hang-after: unusable number"),
+        (["thin", *PLUG_INS, "--until-ci", "nan"], "--until-ci: unusable number"),
+        (["thin", *PLUG_INS, "--max-episodes", "-5"], "--max-episodes: unusable number"),
+        (["thin", *PLUG_INS, "--resume", ""], "--resume: unusable path"),
+        (["x" * 300 + ".toml"], "unreadable suite"),
+        (["/dev/zero.toml"], "unreadable suite"),
         (["thin", "--frobnicate"], "unrecognized arguments: --frobnicate"),
         ([], "arguments are required: SUITE"),
     ],
@@ -92,6 +108,45 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert printed.err.count("\n") == 1
     assert message in printed.err
     assert not (tmp_path / "out").exists()
+
+
+def test_results_go_into_no_folder_of_other_things(
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["thin", *PLUG_INS, "--episodes", "1", "--workers", "0", "--quiet", "--out"]
+    assert main([*command, ""]) == 2
+    assert "--out: unusable path; got ''" in capsys.readouterr().err
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert main([*command, str(tmp_path)]) == 2
+    assert "is not empty and holds no run (thesis.tex)" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    (tmp_path / "new").mkdir()
+    assert main([*command, str(tmp_path / "new")]) == 0
+    assert main([*command, str(tmp_path)]) == 2
+
+
+@pytest.mark.parametrize("asked", ["banana", "osmesa"])
+def test_an_opengl_that_mujoco_could_not_load_is_one_line_even_for_rays(tmp_path: Path, asked: str) -> None:
+    if asked == "osmesa" and find_library("OSMesa"):
+        pytest.skip("OSMesa is installed")
+    done = subprocess.run(
+        [sys.executable, "-m", "mpgrasp.bench", "thin", "--camera", "ray", "--out", str(tmp_path / "out")],
+        env={**os.environ, "MUJOCO_GL": asked}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("mpgrasp: error: ")
+    assert "MUJOCO_GL" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_table_that_standard_output_does_not_take_is_one_line_and_results_are_kept(tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "mpgrasp.bench", "settings", "thin"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "mpgrasp: error: the system refused: No space left on device\n"
 
 
 @pytest.fixture

@@ -154,6 +154,32 @@ def test_a_broken_line_in_the_middle_is_an_error_and_is_left_alone(
     assert (part / "episodes.jsonl").read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"success": "yes"}, "line 2 is not an episode's"),
+        ({"outcome": "missed"}, "outcome 'missed' beside success True"),
+        ({"sim_time_s": -1.0}, "below 0"),
+        ({"seed": 5}, "is of no episode of this run"),
+        ({"scene_seed": 5}, "is of no episode of this run"),
+        ({"episode": 999}, "is of no episode of this run"),
+        ({"episode": -1}, "is of no episode of this run"),
+        ({"detector": "oracle"}, "is of no episode of this run"),
+        ({"suite": "unseen"}, "is of no episode of this run"),
+    ],
+)
+def test_an_edited_line_is_an_error_and_is_left_alone(
+    part: Path, capsys: pytest.CaptureFixture[str], change: dict[str, Any], reason: str
+) -> None:
+    first, second, *rest = (part / "episodes.jsonl").read_text().splitlines(keepends=True)
+    edited = json.dumps({**json.loads(second), "success": True, "outcome": "success", **change}) + "\n"
+    (part / "episodes.jsonl").write_text("".join([first, edited, *rest]))
+    before = (part / "episodes.jsonl").read_bytes()
+    assert main(["--resume", str(part)]) == 2
+    assert reason in capsys.readouterr().err
+    assert sorted((part / "episodes.jsonl").read_bytes().splitlines()) == sorted(before.splitlines())
+
+
 def test_error_rows_are_tried_again(fake_world: pytest.MonkeyPatch, whole: Path, tmp_path: Path) -> None:
     out = tmp_path / "broken"
     fake_world.setattr("mpgrasp.episode.episode.run_episode", fakes.breaks_off)

@@ -104,7 +104,7 @@ def test_nothing_usable_is_exit_code_2_with_every_reason(
         (["paper", "--objects", "."], "--objects with several suites"),
         (["single", "--objects", "absent.stl"], "no such file or folder of objects; got 'absent.stl'"),
         (["single", "--objects", "."], "no mesh in folder"),
-        (["single", "--objects", ".", "--density", "-1"], "density out of range"),
+        (["single", "--objects", ".", "--density", "-1"], "--density: unusable number"),
         (["single", "--objects", "ycb"], "pip install mpgrasp[ycb]"),
     ],
 )

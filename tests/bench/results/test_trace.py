@@ -10,6 +10,7 @@ from toy_runs import lines, trace
 from mpgrasp.bench.record import played
 from mpgrasp.bench.results.trace import KEPT, prune_traces, read_trace
 from mpgrasp.exceptions import OutputError
+from mpgrasp.outcome import Outcome
 
 
 def test_a_trace_is_read_as_it_was_recorded(tmp_path: Path) -> None:
@@ -26,7 +27,7 @@ def test_a_trace_is_read_as_it_was_recorded(tmp_path: Path) -> None:
     assert found.still_phases[0] == "reach"
     assert found.still_phases[-1] == "lift"
     assert all(still[:4] == b"RIFF" for still in found.stills)
-    assert read_trace(tmp_path, changed(line, success=True)) is None
+    assert read_trace(tmp_path, changed(line, success=True, outcome=Outcome.SUCCESS)) is None
     assert read_trace(tmp_path, changed(line, state_hash="x")) is None
 
 
@@ -48,7 +49,7 @@ def test_the_same_traces_are_kept_in_whatever_order_episodes_end(tmp_path: Path)
 def test_an_episode_that_ends_otherwise_replaces_its_trace(tmp_path: Path) -> None:
     (line,) = played(lines("0"))
     trace(tmp_path, line, ticks=3)
-    trace(tmp_path, changed(line, success=True), ticks=3)
+    trace(tmp_path, changed(line, success=True, outcome=Outcome.SUCCESS), ticks=3)
     assert {path.name.rpartition("-0000-")[2] for path in tmp_path.iterdir()} == {
         "success.npz", "success-stills.npz",
     }  # fmt: skip

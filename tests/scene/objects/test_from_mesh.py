@@ -65,6 +65,32 @@ def test_unusable_surface_is_refused_with_its_reason(tmp_path: Path, make: Any, 
         assert "\n" not in str(caught.value)
 
 
+def test_a_binary_stl_that_is_cut_off_says_so(tmp_path: Path) -> None:
+    whole = box(tmp_path / "box.stl").read_bytes()
+    for content in (whole[:-1], whole[:300], whole[:84], whole + b"x" * 50):
+        (tmp_path / "box.stl").write_bytes(content)
+        with pytest.raises(AssetError, match=r"cut off or too long; got '\d+ bytes'.*= 684"):
+            read_body(tmp_path / "box.stl")
+
+
+def test_a_text_stl_is_read_and_one_that_is_cut_off_says_so(tmp_path: Path) -> None:
+    text = trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box(EDGES))
+    (tmp_path / "box.stl").write_text(text)
+    np.testing.assert_allclose(read_body(tmp_path / "box.stl").size, EDGES, rtol=1e-5)
+    (tmp_path / "box.stl").write_text(text[: len(text) // 2])
+    with pytest.raises(AssetError, match="without its end"):
+        read_body(tmp_path / "box.stl")
+
+
+@pytest.mark.parametrize(("suffix", "comment"), [(".obj", "# café\n"), (".ply", "comment café\n")])
+def test_comments_in_latin_1_are_no_matter(tmp_path: Path, suffix: str, comment: str) -> None:
+    content = box(tmp_path / f"box{suffix}").read_bytes()
+    at = 0 if suffix == ".obj" else content.index(b"element")
+    path = tmp_path / f"other{suffix}"
+    path.write_bytes(content[:at] + comment.encode("latin-1") + content[at:])
+    np.testing.assert_allclose(read_body(path).size, EDGES, rtol=1e-5)
+
+
 @pytest.mark.parametrize("suffix", [".obj", ".stl", ".ply"])
 @pytest.mark.parametrize("content", [b"", b"  \n", b"v 0 0 0\n", bytes(range(200)) * 3])
 def test_file_without_a_mesh_is_refused_in_one_line(tmp_path: Path, suffix: str, content: bytes) -> None:
@@ -123,11 +149,18 @@ def test_cached_body_is_the_same_to_the_bit(tmp_path: Path, monkeypatch: pytest.
         assert [piece.tobytes() for piece in other.pieces] == [piece.tobytes() for piece in made.pieces]
 
 
-def test_damaged_cache_is_made_anew(tmp_path: Path, cache: Path) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        "{", "[]", "{}", '{"pieces": 1}', '{"pieces": [[]], "volume": 1}', '{"pieces": [], "volume": 1}',
+        '{"pieces": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]], "volume": "much"}', '{"refused": 3}',
+    ],
+)  # fmt: skip
+def test_damaged_cache_is_made_anew(tmp_path: Path, cache: Path, content: str) -> None:
     path = box(tmp_path / "box.stl")
     read_body(path)
     (entry,) = (cache / "meshes").iterdir()
-    entry.write_text("{")
+    entry.write_text(content)
     assert len(read_body(path).pieces) == 1
     assert json.loads(entry.read_text())["volume"] > 0
 
