@@ -8,7 +8,7 @@ metric) and executed by the free-flying gripper in the true scene. Accuracy is t
 labelled grasp.
 Calibration holds the best grasp's quality against its success, over all views in which a grasp was found, and
 the same trials choose the threshold of MP-PC's exist_peak(), for each detector and for all of them together;
-the rule stands in reliability.py.
+the rule stands in calibration.py.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import study
-from reliability import calibration, choose_threshold, draw_peaks, draw_reliability
+from calibration import calibration, choose_threshold, draw_peaks, draw_reliability
 from single_view import Trial, execute, propose
 
 from mpgrasp.controllers.config import ReachConfig

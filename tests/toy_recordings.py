@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from fakes import FakeResult
 
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import crop_resize, inpaint
@@ -95,3 +96,9 @@ def play(recorder: Recorder, simulation: Any, ticks: int = 6) -> None:
             )
         )
     recorder.finish("success")
+
+
+def shown(scene_config: Any, seed: int, *, recorder: Recorder, **_: Any) -> FakeResult:
+    """An episode of six ticks in the small world, which a recorder is shown."""
+    play(recorder, toy_simulation())
+    return FakeResult(seed, scene_config)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,7 +84,7 @@ class FilmRecorder:
         self._shoot(record.simulation, record.event or "")
 
     def finish(self, event: str) -> None:
-        """Write the files.
+        """Write the files, each of them that can be.
 
         Raises:
             OutputError: the disk does not take them.
@@ -98,10 +99,17 @@ class FilmRecorder:
         write_caption(last, self._caption, event)
         self.pictures.append(last)
         self.times.append(self.times[-1] + _PERIOD)
-        for path in self.paths:
-            self._write_film(path)
+        files = [partial(self._write_film, path) for path in self.paths]
         if self.strip is not None:
-            self._write_strip(self.strip)
+            files.append(partial(self._write_strip, self.strip))
+        failed: list[OutputError] = []
+        for write in files:  # where there is no room for one, there may be for another
+            try:
+                write()
+            except OutputError as error:
+                failed.append(error)
+        if failed:
+            raise failed[0]
 
     def _look_at_maps(self, record: TickRecord) -> None:
         if record.frame is not None:

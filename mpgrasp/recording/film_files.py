@@ -89,7 +89,7 @@ def _write_mp4(path: Path, pictures: Sequence[Picture], durations: FloatArray) -
             pass  # it says below why it has stopped
         complaint = encoder.stderr.read().decode(errors="replace")
     if encoder.returncode != 0:
-        raise OSError(f"ffmpeg: {complaint.strip()}")
+        raise OSError(f"ffmpeg: {complaint.strip() or f'ended with exit code {encoder.returncode}'}")
 
 
 def _milliseconds(durations: FloatArray) -> list[int]:

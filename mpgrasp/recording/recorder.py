@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -82,6 +82,36 @@ class TeeRecorder:
     def finish(self, event: str) -> None:
         for recorder in self.recorders:
             recorder.finish(event)
+
+
+class LenientRecorder:
+    """Shows everything to a recorder until that fails to write: the episode is worth more than its recording.
+
+    Args:
+        make: makes the recorder; may fail likewise.
+        lost: is told what went wrong, once.
+    """
+
+    def __init__(self, make: Callable[[], Recorder], lost: Callable[[OutputError], object]) -> None:
+        self._lost = lost
+        self._recorder: Recorder = NullRecorder()
+        self._try(lambda: setattr(self, "_recorder", make()))
+
+    def start(self, simulation: Simulation) -> None:
+        self._try(lambda: self._recorder.start(simulation))
+
+    def tick(self, record: TickRecord) -> None:
+        self._try(lambda: self._recorder.tick(record))
+
+    def finish(self, event: str) -> None:
+        self._try(lambda: self._recorder.finish(event))
+
+    def _try(self, action: Callable[[], object]) -> None:
+        try:
+            action()
+        except OutputError as error:
+            self._recorder = NullRecorder()
+            self._lost(error)
 
 
 def claim_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:

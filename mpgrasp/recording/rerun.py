@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 
 from mpgrasp.depth import DepthFrame, crop_resize
 from mpgrasp.exceptions import OutputError
+from mpgrasp.files.atomic import replace_file
 from mpgrasp.geometry import FloatArray, transform_points
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.recording.false_colour import shade, shade_lines
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from mpgrasp.scene.simulation import Simulation
 
 TIMELINE = "sim_time"
+FLUSH_LIMIT = 60.0
+"""Wall-clock time that rerun may take to encode what it was given [s]; usually well below one."""
 
 _DEPTH_UNITS = 4000.0  # depth images in quarters of a millimetre, below the sensor's own steps
 _IMAGE_SIZE = 224  # [px], larger depth images are cropped and reduced to this
@@ -46,7 +49,9 @@ class RerunRecorder:
     def __init__(self, path: str | Path) -> None:
         self.path = claim_file(path, (".rrd",))
         self._stream = rr.RecordingStream("mpgrasp", recording_id=None)
-        self._stream.save(self.path, default_blueprint=_blueprint())
+        # not rerun's own file: on a full disk it waits for hours, and leaves half a recording behind
+        self._bytes = rr.binary_stream(self._stream)
+        self._stream.send_blueprint(_blueprint(), make_active=False)
         self._scene: RerunModel | None = None
         self._phase: str | None = None
         self._event: str | None = None
@@ -92,16 +97,23 @@ class RerunRecorder:
             log("world/grasp", rr.LineStrips3D(strips, colors=[_GRASP_COLOUR], radii=[0.0015]))
 
     def finish(self, event: str) -> None:
-        """Write the outcome and close the file.
+        """Write the file as a whole.
 
         Raises:
-            OutputError: nothing arrived in the file.
+            OutputError: the disk does not take it, or rerun does not hand it over within `FLUSH_LIMIT`.
         """
         self._stream.log("events", rr.TextLog(event, level="INFO"))
-        self._stream.flush()
+        try:
+            content = self._bytes.read(flush_timeout_sec=FLUSH_LIMIT)
+        except (RuntimeError, ValueError) as error:
+            raise OutputError(f"a recording cannot be finished: {error}", got=str(self.path)) from error
         self._stream.disconnect()
-        if not self.path.is_file() or self.path.stat().st_size == 0:
-            raise OutputError("the recording was not written", got=str(self.path), allowed="a disk with room")
+        try:
+            replace_file(self.path, content or b"")
+        except OSError as error:
+            raise OutputError(
+                f"a recording cannot be written: {error.strerror or error}", got=str(self.path)
+            ) from error
 
     def _log_frame(self, frame: DepthFrame) -> None:
         shape = frame.depth.shape

@@ -134,7 +134,7 @@ class Trainer:
         """Train to the end of the budget, or for `stop_after` steps, and return the best validation.
 
         Raises:
-            ConfigError: the loss is no longer finite.
+            ConfigError: the loss, a weight or an output of the network is no longer finite.
             OutputError: weights, curves or checkpoint cannot be written.
         """
         last_step = self.step + stop_after if stop_after is not None else None
@@ -186,9 +186,7 @@ class Trainer:
             return
         losses = torch.stack(steps).double().cpu()
         if not losses.isfinite().all():
-            raise ConfigError(
-                "the loss is no longer finite", got=f"lr {self.config.lr:g}", allowed="a lower lr"
-            )
+            raise self._diverged("the loss")
         self._losses += torch.cat([losses.sum(dim=0), torch.tensor([len(steps)])])
         means = dict(zip(PARTS, losses.mean(dim=0).tolist(), strict=True))
         log.update(self.progress, self.step, self.step * self.config.batch, means)
@@ -211,11 +209,34 @@ class Trainer:
         if arrived:
             log.note(f"{arrived} more shards, {len(self.dataset.training)} training images")
 
+    def _diverged(self, what: str) -> ConfigError:
+        """Return the error of a training that has left the finite numbers; what was saved before stays."""
+        kept = [str(file) for file in (self.out, self.checkpoint) if file.is_file()]
+        kept_words = f"; kept from before: {', '.join(kept)}" if kept else ""
+        return ConfigError(
+            f"the training diverged: {what} at step {self.step} is no longer finite",
+            got=f"--lr {self.config.lr:g}, --precision {self.config.precision}",
+            allowed=f"a lower --lr, or --precision float32{kept_words}",
+        )
+
+    def _require_finite_weights(self) -> None:
+        values = (*self.network.state_dict().values(), *self.average.values())
+        if not all(bool(value.isfinite().all()) for value in values):
+            raise self._diverged("a weight")
+
     def evaluate(self) -> dict[str, float]:
-        """Validate the averaged weights and return the summary; see Validator."""
+        """Validate the averaged weights and return the summary; see Validator.
+
+        Raises:
+            ConfigError: weights, or what the network makes of images, are no longer finite.
+        """
+        self._require_finite_weights()
         own = {k: v.clone() for k, v in self.network.state_dict().items()}
         self.network.load_state_dict(self.average)
-        summary = self.validator.evaluate(self.network)
+        try:
+            summary = self.validator.evaluate(self.network)
+        except FloatingPointError:
+            raise self._diverged("an output of the network") from None
         self.network.load_state_dict(own)
         return summary
 
@@ -243,8 +264,10 @@ class Trainer:
         """Write everything that a later `resume` needs.
 
         Raises:
+            ConfigError: a weight is no longer finite; the checkpoint from before stays.
             OutputError: the file cannot be written.
         """
+        self._require_finite_weights()
         state = {
             "network": self.network.state_dict(),
             "average": self.average,

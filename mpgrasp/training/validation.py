@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from mpgrasp.detectors.network_detector import postprocess
+from mpgrasp.detectors.network_detector import LARGEST, postprocess
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.losses import grasp_loss, to_tensors
 from mpgrasp.training.metrics import match_labels, summarise
@@ -50,13 +50,19 @@ class Validator:
 
     @torch.inference_mode()
     def evaluate(self, network: nn.Module) -> dict[str, float]:
-        """Return metrics.summarise and "validation_loss"; the network is left in evaluation mode."""
+        """Return metrics.summarise and "validation_loss"; the network is left in evaluation mode.
+
+        Raises:
+            FloatingPointError: an output of the network is not finite, or beyond `LARGEST`.
+        """
         network.eval()
         images, lift = self.images, self._chosen_to_lift()
         matches, graspable, lifted = {}, {}, {}
         total = 0.0
         for chunk in np.array_split(images, math.ceil(len(images) / BATCH)) if len(images) else ():
             heads, loss = self._run(network, chunk)
+            if not (np.abs(heads) < LARGEST).all():  # as for a detector; wider ones overflow on the way
+                raise FloatingPointError("an output of the network is not finite")
             total += loss * len(chunk)
             for i, maps in zip(chunk.tolist(), heads, strict=True):
                 truth = self._data.sample(i).resized(self._config.input.size)

@@ -119,45 +119,45 @@ def trial(quality: float, lifted: bool, scene: int = 0, **more: Any) -> Any:
 
 
 def test_a_detector_that_claims_what_it_achieves_has_no_calibration_error() -> None:
-    reliability = module("reliability")
+    study = module("calibration")
     lines = [trial(q, k < 20 * q) for q in (0.05, 0.25, 0.75, 0.95) for k in range(20)]
-    found = reliability.calibration(lines)
+    found = study.calibration(lines)
     assert found["ece"] == pytest.approx(0, abs=1e-9)
     assert found["brier"] == pytest.approx(np.mean([q * (1 - q) for q in (0.05, 0.25, 0.75, 0.95)]))
     assert sum(b["n"] for b in found["bins"]) == found["n"] == 80
 
 
 def test_overconfidence_is_the_calibration_error_and_no_grasp_counts_for_nothing() -> None:
-    reliability = module("reliability")
+    study = module("calibration")
     lines = [trial(1.0, k % 2 == 0) for k in range(10)] + [trial(0.0, False, outcome="no_grasp")] * 5
-    found = reliability.calibration(lines)
+    found = study.calibration(lines)
     assert (found["n"], found["ece"], found["brier"]) == (10, 0.5, 0.5)
     assert found["brier_constant"] == 0.25
-    assert reliability.calibration(lines[10:]) == {"n": 0, "bins": []}
+    assert study.calibration(lines[10:]) == {"n": 0, "bins": []}
 
 
 def test_the_threshold_parts_right_peaks_from_false_ones() -> None:
-    reliability = module("reliability")
+    study = module("calibration")
     lines = [trial(0.795, True, scene=k) for k in range(60)]
     lines += [trial(0.305, False, scene=k, graspable=False) for k in range(40)]
-    chosen = reliability.choose_threshold(lines, np.random.default_rng(0))
+    chosen = study.choose_threshold(lines, np.random.default_rng(0))
     assert chosen["threshold"] == pytest.approx(0.31)
     assert chosen["youden"] == chosen["found"]["rate"] == 1
     assert chosen["false_peaks"]["count"] == 0
     assert chosen["careful"]["threshold"] == pytest.approx(0.31)
     assert chosen["low"] <= chosen["threshold"] <= chosen["high"]
-    too_few = reliability.choose_threshold(lines[:3], np.random.default_rng(0))
+    too_few = study.choose_threshold(lines[:3], np.random.default_rng(0))
     assert too_few["careful"] is None
 
 
 def test_the_chosen_threshold_is_the_best_of_all_by_counting_one_by_one() -> None:
-    reliability = module("reliability")
+    study = module("calibration")
     rng = np.random.default_rng(3)
     lines = [
         trial(float(q), bool(rng.random() < q), scene=k // 4, graspable=bool(rng.random() < 0.9))
         for k, q in enumerate(rng.random(200))
     ]
-    chosen = reliability.choose_threshold(lines, np.random.default_rng(0))
+    chosen = study.choose_threshold(lines, np.random.default_rng(0))
 
     def youden(threshold: float) -> float:
         right = [line.peak_height > threshold for line in lines if line.lifted]

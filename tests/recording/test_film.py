@@ -9,6 +9,7 @@ from typing import Any
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from full_disk import room_for
 from PIL import Image
 from toy_recordings import play, toy_simulation
 
@@ -173,3 +174,29 @@ def test_a_full_disk_is_one_error_and_leaves_no_half_of_a_film(
     ):
         play(recorder, simulation)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_finds_no_room_does_not_cost_the_smaller_one(simulation: Any, tmp_path: Path) -> None:
+    gif, mp4 = tmp_path / "film.gif", tmp_path / "film.mp4"
+    play(FilmRecorder(gif, mp4, config=FilmConfig(backend="ray")), simulation)
+    small, large = mp4.stat().st_size, gif.stat().st_size
+    assert small < large
+    gif.unlink()
+    mp4.unlink()
+    recorder = FilmRecorder(gif, mp4, config=FilmConfig(backend="ray"))
+    with room_for((small + large) // 2), pytest.raises(OutputError, match=r"cannot be written: .*film\.gif"):
+        play(recorder, simulation)
+    assert [file.name for file in tmp_path.iterdir()] == ["film.mp4"]
+    assert len(iio.imread(mp4, plugin="FFMPEG")) > 1
+
+
+def test_an_encoder_that_dies_without_a_word_is_told_by_its_exit_code(
+    simulation: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    encoder = tmp_path / "ffmpeg"
+    encoder.write_text("#!/bin/sh\nkill -XFSZ $$\n")
+    encoder.chmod(0o755)
+    recorder = FilmRecorder(tmp_path / "film.mp4", config=FilmConfig(backend="ray"))
+    monkeypatch.setattr("imageio_ffmpeg.get_ffmpeg_exe", lambda: str(encoder))
+    with pytest.raises(OutputError, match=r"ffmpeg: ended with exit code -25"):
+        play(recorder, simulation)

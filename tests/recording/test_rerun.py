@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,9 +10,12 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from full_disk import room_for
 from toy_recordings import GRASP, play, toy_simulation
 
+from mpgrasp.exceptions import OutputError
 from mpgrasp.geometry import transform
+from mpgrasp.recording.recorder import NullRecorder, TeeRecorder
 from mpgrasp.recording.rerun import RerunRecorder, grasp_lines
 from mpgrasp.recording.rerun_model import RerunModel
 
@@ -119,3 +123,42 @@ def test_poses_are_logged_only_when_they_change(simulation: Any) -> None:
 def test_transform_of_grasp_is_a_rotation() -> None:
     T = GRASP.T_world_grasp()
     np.testing.assert_allclose(T, transform(T[:3, :3], GRASP.position))
+
+
+def test_on_a_full_disk_a_recording_is_one_error_at_once_and_leaves_nothing(
+    simulation: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "episode.rrd"
+    start = time.monotonic()
+    with (
+        room_for(100_000),
+        pytest.raises(OutputError, match=r"recording cannot be written: .*episode\.rrd"),
+    ):
+        play(RerunRecorder(path), simulation)
+    assert time.monotonic() - start < 20  # rerun itself would wait for hours
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("an earlier one")
+    with room_for(100_000), pytest.raises(OutputError):
+        play(RerunRecorder(path), simulation)
+    assert path.read_text() == "an earlier one"
+
+
+def test_a_recording_has_its_name_only_once_it_is_whole(simulation: Any, tmp_path: Path) -> None:
+    recorder, seen = RerunRecorder(tmp_path / "episode.rrd"), []
+
+    class Looking(NullRecorder):
+        def tick(self, record: Any) -> None:
+            seen.append(list(tmp_path.iterdir()))
+
+    play(TeeRecorder(recorder, Looking()), simulation)
+    assert not any(seen)
+    assert [file.name for file in tmp_path.iterdir()] == ["episode.rrd"]
+
+
+def test_a_recording_brings_its_layout_along(simulation: Any, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    play(RerunRecorder(tmp_path / "episode.rrd"), simulation)
+    reader = RrdReader(tmp_path / "episode.rrd")
+    assert [entry.application_id for entry in reader.recordings()] == ["mpgrasp"]
+    assert [entry.application_id for entry in reader.blueprints()] == ["mpgrasp"]

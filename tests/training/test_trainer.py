@@ -83,12 +83,50 @@ def test_a_run_that_is_told_to_stop_does_so_between_two_steps(shards: Path, tmp_
     assert again.step == 1
 
 
+DIVERGED = r"the training diverged: {} at step \d+ is no longer finite; got '--lr .*; allowed: a lower --lr"
+
+
 def test_a_loss_that_is_not_finite_ends_the_run_with_one_error(shards: Path, tmp_path: Path) -> None:
     run = trainer(shards, tmp_path / "w.safetensors")
     with torch.no_grad():
         next(run.network.parameters()).fill_(float("nan"))
-    with pytest.raises(ConfigError, match="no longer finite"):
+    with pytest.raises(ConfigError, match=DIVERGED.format("the loss")):
         run.run(ProgressLog(quiet=True))
+
+
+@pytest.mark.parametrize("lr", [1e6, 1e30])
+def test_a_rate_that_is_far_too_high_is_said_to_be_and_leaves_no_weights(
+    lr: float, shards: Path, tmp_path: Path
+) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors", lr=lr, epochs=8.0, average=0.0)
+    with pytest.raises(ConfigError, match=DIVERGED.format(".*")):
+        run.run(ProgressLog(quiet=True))
+    if (tmp_path / "w.safetensors").exists():
+        load_weights("dhrnet", tmp_path / "w.safetensors")  # which takes none that are not finite
+
+
+def test_outputs_that_are_not_finite_are_no_validation(shards: Path, tmp_path: Path) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors")
+    for key, value in run.average.items():
+        if key.endswith(".weight"):
+            value.fill_(3e38)  # finite, but no product of two of them is
+    with pytest.raises(ConfigError, match=DIVERGED.format("an output of the network")):
+        run.evaluate()
+
+
+def test_a_training_that_diverges_keeps_what_was_saved_before(shards: Path, tmp_path: Path) -> None:
+    run = trainer(shards, tmp_path / "w.safetensors")
+    run.run(ProgressLog(quiet=True), stop_after=2)
+    run.save()
+    good = run.checkpoint.read_bytes(), run.out.read_bytes()
+    with torch.no_grad():
+        next(run.network.parameters()).fill_(float("inf"))
+    with pytest.raises(ConfigError, match=DIVERGED.format("a weight") + ".*kept from before: .*w.checkpoint"):
+        run.save_checkpoint()
+    assert (run.checkpoint.read_bytes(), run.out.read_bytes()) == good
+    again = trainer(shards, tmp_path / "w.safetensors")
+    assert again.resume()
+    assert again.step == 2
 
 
 def test_a_network_learns_from_colour_and_its_file_says_so(shards: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from msgspec.structs import replace as replace_fields
 
 from mpgrasp.bench.record import Cell, ErrorLine, Line, PlayedLine, Task
 from mpgrasp.command_line import Parser
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.json_values import difference, differences
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def main(command: Sequence[str]) -> int:
     from mpgrasp.bench.commands.run import make_parser as run_parser
     from mpgrasp.bench.playing.description import configuration
     from mpgrasp.bench.playing.planning import make_plan
-    from mpgrasp.bench.playing.player import Player
+    from mpgrasp.bench.playing.player import Player, loss_note
     from mpgrasp.bench.playing.recorded_command import recorded_arguments
     from mpgrasp.bench.results.provenance import provenance
     from mpgrasp.bench.results.reader import read_run
@@ -85,9 +85,12 @@ def main(command: Sequence[str]) -> int:
     for place in differences(run.made_with.as_row(), provenance().as_row()):
         print(f"Not made with the same: {place.words('then', 'now')}")
     line = player.play(task)
-    if plan.record:
+    if plan.record and not player.lost:
         print(f"Recorded: {plan.recordings}/{task.stem}.*")
-    return _report(task, before, line)
+    code = _report(task, before, line)
+    if player.lost:
+        raise OutputError(loss_note(task, player.lost))
+    return code
 
 
 def _one_episode(plan: Plan, arguments: Namespace) -> tuple[Plan, Task]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, real_games
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, loss_note, real_games
 from mpgrasp.bench.playing.workers import WorkerPool
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import ConfigError
@@ -26,6 +26,9 @@ Note = Callable[[str], None]
 class Crew(Protocol):
     """Plays tasks."""
 
+    losses: int
+    """Episodes so far of whose recordings something could not be written."""
+
     def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
         """Play tasks.
 
@@ -33,10 +36,10 @@ class Crew(Protocol):
             tasks: in the order in which they are begun.
             sink: takes each line as soon as it is finished; an episode that could not be played in
                 `ATTEMPTS` attempts has a line too (`player.error_line`).
-            note: is told in words of every episode that is tried again.
+            note: is told in words of every episode that is tried again, and of recordings that are lost.
 
         Raises:
-            MpgraspError: no worker can be started, or a recording cannot be written.
+            MpgraspError: no worker can be started.
         """
         ...
 
@@ -79,10 +82,14 @@ class _ThisProcess:
     def __init__(self, plan: Plan, run_episode: Games, player: Player | None) -> None:
         self._plan, self._run_episode = plan, run_episode
         self._player = player or Player(plan, run_episode)
+        self.losses = 0
 
     def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
         for task in tasks:
             sink(self._line(task, note))
+            if self._player.lost:
+                self.losses += 1
+                note(loss_note(task, self._player.lost))
 
     def close(self) -> None:
         pass

@@ -45,6 +45,8 @@ class Player:
             suite.name: suite.episode_config(camera=plan.camera, noise=plan.noise) for suite in plan.suites
         }
         self._run_episode = run_episode or real_games()
+        self.lost: list[str] = []
+        """Recordings and traces of the last episode that could not be written, and why."""
 
     def prepare(self) -> list[str]:
         """Have networks compiled now, once for all workers; a line for people of each that was.
@@ -66,10 +68,12 @@ class Player:
     def play(self, task: Task) -> PlayedLine:
         """The line of one episode, to go to episodes.jsonl.
 
+        What cannot be written of its recordings is told in `lost`, and takes nothing from the line.
+
         Raises:
-            OutputError: its recording cannot be written.
-            EpisodeError: something else went wrong on the way; it is the cause.
+            EpisodeError: something went wrong on the way; it is the cause.
         """
+        self.lost = []
         suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
         run_episode = games if callable(games) else games[suite.trial]
         try:
@@ -83,10 +87,7 @@ class Player:
             )
             line = line_of({**result.as_record(), **_which(self.plan, task)})
             assert not isinstance(line, ErrorLine), "no episode ends with the outcome of an error row"
-            if trace is not None:
-                trace.save(line)
-        except OutputError:
-            raise
+            self._save(trace, line)
         except Exception as error:
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
         return line
@@ -95,17 +96,36 @@ class Player:
         folder = self.plan.traces
         return None if folder is None else TraceRecorder(folder, self.plan.camera)
 
+    def _save(self, trace: TraceRecorder | None, line: PlayedLine) -> None:
+        try:
+            if trace is not None:
+                trace.save(line)
+        except OutputError as error:
+            self._lose(error)
+
+    def _lose(self, error: OutputError) -> None:
+        self.lost.append(str(error))
+
     def _recorder(self, task: Task, trace: TraceRecorder | None) -> Recorder:
         if self.plan.recordings is None or task.episode >= self.plan.record:
             return trace or NullRecorder()
         from mpgrasp.recording.film import FilmConfig, FilmRecorder
-        from mpgrasp.recording.recorder import TeeRecorder
+        from mpgrasp.recording.recorder import LenientRecorder, TeeRecorder
         from mpgrasp.recording.rerun import RerunRecorder
 
         stem = self.plan.recordings / task.stem
-        film = FilmRecorder(f"{stem}.gif", f"{stem}.mp4", config=FilmConfig(backend=self.plan.camera))
-        recorders: list[Recorder] = [RerunRecorder(f"{stem}.rrd"), film, *([trace] if trace else [])]
-        return TeeRecorder(*recorders)
+        config = FilmConfig(backend=self.plan.camera)
+        makers: list[Callable[[], Recorder]] = [
+            lambda: RerunRecorder(f"{stem}.rrd"),
+            lambda: FilmRecorder(f"{stem}.gif", f"{stem}.mp4", config=config),
+        ]
+        recorders = [LenientRecorder(make, self._lose) for make in makers]
+        return TeeRecorder(*recorders, *([trace] if trace else []))
+
+
+def loss_note(task: Task, lost: Sequence[str]) -> str:
+    """Return a sentence about an episode of whose recordings something was lost."""
+    return f"{task} counts, but of its recordings is lost: {' | '.join(lost)}"
 
 
 def error_line(plan: Plan, task: Task, troubles: Sequence[tuple[str, str]]) -> ErrorLine:

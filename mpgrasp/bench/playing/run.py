@@ -62,6 +62,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
                 finished = _play_batches(plan, directory, crew, progress)
             finally:
                 crew.close()
+                code = EXIT_BAD_INPUT if crew.losses else 0
         except KeyboardInterrupt:
             progress.note("interrupted; the finished episodes are kept")
             code = EXIT_INTERRUPTED

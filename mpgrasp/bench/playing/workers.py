@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, loss_note
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
@@ -55,6 +55,7 @@ class WorkerPool:
         self._hang_after, self._attempts = hang_after, attempts
         self._workers: list[_Worker] = []
         self._failed_starts = 0
+        self.losses = 0
 
     def play(self, tasks: Sequence[Task], sink: Callable[[Line], None], note: Callable[[str], None]) -> None:
         todo: deque[Task] = deque(tasks)
@@ -87,7 +88,11 @@ class WorkerPool:
                 elif task is not None and kind == "broke":
                     lost(task, *content)
                 elif kind == "line":
-                    sink(content)
+                    line, lost_recordings = content
+                    sink(line)
+                    if lost_recordings:
+                        self.losses += 1
+                        note(loss_note(line.task, lost_recordings))
 
     def close(self) -> None:
         while self._workers:
@@ -158,7 +163,7 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[str, Any]:
-        """(ready, None), (line, Line), (broke, (what, traceback)), (refused, error) or (dead, what)."""
+        """(ready, None), (line, (Line, lost)), (broke, (what, trace)), (refused, error) or (dead, what)."""
         if self.connection.poll():
             self.deadline = math.inf
             try:
@@ -210,7 +215,8 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str)
                 task, limit = connection.recv()
                 faulthandler.dump_traceback_later(limit, file=log)
                 try:
-                    connection.send(("line", player.play(task)))
+                    line = player.play(task)
+                    connection.send(("line", (line, player.lost)))
                 except EpisodeError as error:
                     connection.send(("broke", (str(error), traceback.format_exc())))
                     # an error may leave a detector behind in a state that the next episode must not see

@@ -14,6 +14,8 @@ from pathlib import Path
 import fakes
 import pytest
 from bench_runs import PLUG_INS, records
+from full_disk import room_for
+from toy_recordings import shown
 
 from mpgrasp.bench.__main__ import main
 from mpgrasp.exceptions import ConfigError
@@ -42,6 +44,25 @@ def test_a_run_prints_the_table_and_leaves_all_files(
     assert run["configuration"]["suite"]["scenes"][0]["objects"] == ["usb_stick"]
     assert run["configuration"]["episode"]["start_jitter"] == 0.05
     assert run["made_with"]["packages"]["mujoco"]
+
+
+def test_a_run_without_room_for_its_recordings_keeps_its_episodes_and_says_so_by_its_exit_code(
+    fake_world: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fake_world.setattr("mpgrasp.episode.episode.run_episode", shown)
+    command = ["thin", *PLUG_INS, "--episodes", "3", "--record", "2", "--camera", "ray", "--workers", "0"]
+    with room_for(200_000):
+        assert main([*command, "--quiet", "--out", str(tmp_path / "full")]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2
+    for episode, line in enumerate(said):
+        assert line.startswith(f"mpgrasp: episode {episode} of thin ")
+        assert ".rrd" in line
+    assert main([*command, "--quiet", "--out", str(tmp_path / "roomy")]) == 0
+    assert capsys.readouterr().err == ""
+    for folder in ("full", "roomy"):
+        assert [line["episode"] for line in records(tmp_path / folder)] == [0, 1, 2]
+        assert json.loads((tmp_path / folder / "summary.json").read_text())["complete"]
 
 
 def test_lines_have_all_promised_keys_in_sorted_order(fake_world: object, tmp_path: Path) -> None:

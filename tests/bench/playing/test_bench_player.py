@@ -1,12 +1,18 @@
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import fakes
 import pytest
-from bench_plans import CONTROLLER, make_plan
+from bench_plans import CONTROLLER, lines_of, make_plan, without_timing
+from full_disk import room_for
+from toy_recordings import shown
 
+from mpgrasp.bench.playing.crew import make_crew
 from mpgrasp.bench.playing.player import Player
+from mpgrasp.bench.record import Line
 from mpgrasp.exceptions import ConfigError
 
 
@@ -44,3 +50,42 @@ def test_what_does_not_compile_says_nothing() -> None:
 def test_colour_is_refused_before_the_first_episode_where_rays_are_cast() -> None:
     with pytest.raises(ConfigError, match=r"reads colour, which takes OpenGL.*camera ray"):
         player("Colourful", camera="ray").prepare()
+
+
+def recorded(folder: Path, workers: int) -> tuple[list[Line], list[str], int]:
+    """Lines, notes and losses of two episodes, the first of which is recorded."""
+    plan = make_plan(episodes=2, record=1, recordings=folder, camera="ray")
+    crew = make_crew(plan, workers, run_episode=shown)
+    lines: list[Line] = []
+    notes: list[str] = []
+    try:
+        crew.play(plan.tasks(), lines.append, notes.append)
+    finally:
+        crew.close()
+    return lines, notes, crew.losses
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_recording_that_finds_no_room_takes_nothing_from_its_episode(workers: int, tmp_path: Path) -> None:
+    whole, roomy, nothing_lost = recorded(tmp_path / "roomy", 0)
+    assert (roomy, nothing_lost) == ([], 0)
+    assert {file.suffix for file in (tmp_path / "roomy").iterdir()} == {".rrd", ".gif", ".mp4"}
+    with room_for(100_000):
+        lines, notes, losses = recorded(tmp_path / "full", workers)
+    assert without_timing(lines) == without_timing(whole)
+    assert losses == 1
+    assert len(notes) == 1
+    assert re.match(r"episode 0 of thin .* counts, but .*is lost: a recording cannot be written", notes[0])
+    assert ".rrd" in notes[0]
+    assert not list((tmp_path / "full").glob("*.rrd"))
+    assert not list((tmp_path / "full").glob(".*"))
+
+
+def test_a_trace_that_cannot_be_written_takes_nothing_from_its_episode(tmp_path: Path) -> None:
+    (tmp_path / "traces").write_text("in the way")
+    plan = make_plan(episodes=1, traces=tmp_path / "traces", camera="ray")
+    one = Player(plan, shown)
+    line = one.play(plan.tasks()[0])
+    assert without_timing([line]) == without_timing(lines_of(make_plan(episodes=1)))
+    assert len(one.lost) == 1
+    assert "a trace cannot be written" in one.lost[0]
