@@ -23,7 +23,7 @@ ORDER = (
     "robot", "camera",
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
-    "controllers", "motion", "recording", "episode",
+    "controllers", "guards", "motion", "recording", "episode",
     "suite", "plugins", "settings", "env", "inspection",
     "training.data", "training",
     "bench.record", "bench.analysis", "bench.results", "bench.report", "bench.meshes",

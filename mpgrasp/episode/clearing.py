@@ -21,6 +21,7 @@ from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.guards.asking import ask_final_grasp
 from mpgrasp.motion.arm_driver import OnTick
 from mpgrasp.motion.reflex import Reflex
 from mpgrasp.motion.trajectory import path_profile
@@ -63,6 +64,7 @@ def run_clearing(
         ConfigError: a scene without a basket, or one that cannot be built.
         CameraError: a camera backend that this machine does not have, or that has no colour for a detector
             that reads it.
+        PlugInError: what the detector or the controller returned cannot be used.
     """
     config = config or ClearingConfig()
     require_basket(scene_config)
@@ -244,7 +246,7 @@ class Clearing:
 
     def _aim(self) -> FloatArray:
         """Point (3,) that a stopped reach was about [m]: its grasp so far, or the place under the camera."""
-        grasp, frame = self.controller.final_grasp(), self.episode.frame
+        grasp, frame = ask_final_grasp(self.controller), self.episode.frame
         if grasp is not None:
             return grasp.position
         assert frame is not None, "a reach looks before it moves"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
 from typing import Any
 
 from mpgrasp.bench.playing.cast import Cast
@@ -10,7 +12,7 @@ from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.trace_recorder import TraceRecorder
 from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
 from mpgrasp.detectors.detector import prepare, reads_colour
-from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
+from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError, PlugInError
 from mpgrasp.recording.recorder import NullRecorder, Recorder
 from mpgrasp.suite import episode_seed
 
@@ -23,6 +25,11 @@ Games = RunEpisode | Mapping[str, RunEpisode]
 
 class EpisodeError(MpgraspError):
     """An episode that could not be played to its end, by a fault in a detector, controller or mpgrasp."""
+
+    @property
+    def certain(self) -> bool:
+        """True if another attempt would end in the same way: what was returned cannot be used."""
+        return isinstance(self.__cause__, PlugInError)
 
 
 class Player:
@@ -73,21 +80,22 @@ class Player:
         suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
         run_episode = games if callable(games) else games[suite.trial]
         try:
-            result = run_episode(
-                suite.scene_config(task.episode),
-                episode_seed(suite.name, self.plan.seed, task.episode),
-                detector=self._cast.detector(task.detector, task.suite),
-                controller=self._cast.controller(task.controller, task.suite),
-                config=self.episode_configs[suite.name],
-                recorder=self._recorder(task, trace),
-            )
+            with redirect_stdout(sys.stderr):  # standard output is for results, whatever a plug-in prints
+                result = run_episode(
+                    suite.scene_config(task.episode),
+                    episode_seed(suite.name, self.plan.seed, task.episode),
+                    detector=self._cast.detector(task.detector, task.suite),
+                    controller=self._cast.controller(task.controller, task.suite),
+                    config=self.episode_configs[suite.name],
+                    recorder=self._recorder(task, trace),
+                )
             line = line_of({**result.as_record(), **_which(self.plan, task)})
             assert not isinstance(line, ErrorLine), "no episode ends with the outcome of an error row"
             if trace is not None:
                 trace.save(line)
         except OutputError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a plug-in that exits must not end the run
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
         return line
 

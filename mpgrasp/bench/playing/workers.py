@@ -60,9 +60,9 @@ class WorkerPool:
         todo: deque[Task] = deque(tasks)
         troubles: dict[Task, list[tuple[str, str]]] = defaultdict(list)
 
-        def lost(task: Task, what: str, trace: str) -> None:
+        def lost(task: Task, what: str, trace: str, certain: bool = False) -> None:
             troubles[task].append((what, trace))
-            if len(troubles[task]) < self._attempts:
+            if len(troubles[task]) < self._attempts and not certain:
                 note(f"{what}; it is played again")
                 todo.appendleft(task)
             else:
@@ -158,7 +158,7 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[str, Any]:
-        """(ready, None), (line, Line), (broke, (what, traceback)), (refused, error) or (dead, what)."""
+        """(ready, None), (line, Line), (refused, error), (dead, what) or (broke, (what, traceback, certain))."""
         if self.connection.poll():
             self.deadline = math.inf
             try:
@@ -212,7 +212,7 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str)
                 try:
                     connection.send(("line", player.play(task)))
                 except EpisodeError as error:
-                    connection.send(("broke", (str(error), traceback.format_exc())))
+                    connection.send(("broke", (str(error), traceback.format_exc(), error.certain)))
                     # an error may leave a detector behind in a state that the next episode must not see
                     player = Player(plan, run_episode)
         except MpgraspError as error:
