@@ -283,5 +283,94 @@ GUARDED: Mapping[str, BadPlugIn] = {
 }
 """Plug-ins that the guards of every run refuse."""
 
-BAD_PLUG_INS: Mapping[str, BadPlugIn] = {**GUARDED}
+
+def _module(said: str, line: str, **more: str) -> BadPlugIn:
+    """Return a detector whose module does something when it is imported."""
+    source = f"{line}\n{SOUND_DETECTOR}\n\nclass Bad(Sound):\n    pass\n"
+    return BadPlugIn(kind="detector", source=source, said=said, by="loader", **more)
+
+
+def _given_as(said: str, name: str) -> BadPlugIn:
+    return _module(said, "", given_as=name)
+
+
+LOADED: Mapping[str, BadPlugIn] = {
+    "exits": _module(
+        r"import of a detector plug-in ends the program: sys\.exit\(0\)", "import sys; sys.exit(0)"
+    ),
+    "exits-with-words": _module(r"sys\.exit\('no licence'\)", "import sys; sys.exit('no licence')"),
+    "exits-hard": _module(r"ends the program: os\._exit\(0\)", "import os; os._exit(0)"),
+    "interrupts": _module("raises KeyboardInterrupt, which nobody has typed", "raise KeyboardInterrupt"),
+    "hangs": _module("import of a detector plug-in takes longer than", "import time; time.sleep(3600)"),
+    "hangs-stubbornly": _module(
+        "import of a detector plug-in takes longer than",
+        """
+import time
+for _ in range(3):
+    try:
+        time.sleep(3600)
+    except:
+        pass
+""",
+    ),
+    "hangs-when-made": _detector(
+        "constructor of a detector plug-in takes longer than",
+        "def __init__(self): threading.Event().wait()",
+        by="loader",
+        before="import threading",
+    ),
+    "exits-when-made": _controller(
+        "constructor of a controller plug-in ends the program",
+        "def __init__(self): quit_now()",
+        by="loader",
+        before="from sys import exit as quit_now",
+    ),
+    "breaks": _module("cannot be imported .ZeroDivisionError: division by zero", "1 / 0"),
+    "needs-a-package": _module(
+        "cannot be imported .ModuleNotFoundError: No module named 'no_such_package'", "import no_such_package"
+    ),
+    "does-not-parse": _module("cannot be imported .SyntaxError", "def ("),
+    "no-such-class": _given_as("has no class 'Heur'.*allowed: Sound, Bad", "{module}:Heur"),
+    "no-class": _given_as("has no such name; got '{module}:'".replace("{module}", r"\w+"), "{module}:"),
+    "not-a-class": _given_as("has no class 'np'", "{module}:np"),
+    "by-file": _given_as(
+        r"named by its module, not by its file.*allowed: \w+:Bad from the folder of \w+\.py",
+        "./{module}.py:Bad",
+    ),
+    "by-path": _given_as("allowed: .*:Bad with PYTHONPATH=.* or from the folder", "{folder}/{module}.py:Bad"),
+    "by-file-alone": _given_as(r"named by its module.*allowed: \w+:Class", "{module}.py"),
+    "needs-arguments": _detector(
+        "cannot be made .TypeError.*missing 1 required", "def __init__(self, weights): pass", by="loader"
+    ),
+    "lacks-predict": BadPlugIn(
+        kind="detector",
+        source="class Bad:\n    name = 'bad'\n    def reset(self, truth): pass\n",
+        said="detector plug-in lacks predict.*allowed: methods reset, predict",
+        by="loader",
+    ),
+    "lacks-update": BadPlugIn(
+        kind="controller",
+        source="class Bad:\n    name = 'bad'\n    def reset(self, seed): pass\n",
+        said="controller plug-in lacks update, final_grasp, diagnostics",
+        by="loader",
+    ),
+    "predict-takes-nothing": _detector(
+        "predict cannot be called as it is.*allowed: .self, frame.", "def predict(self): pass", by="loader"
+    ),
+    "reset-takes-nothing": _controller(
+        "reset cannot be called as it is.*allowed: .self, seed.", "def reset(self): pass", by="loader"
+    ),
+    "remember-failure-is-a-list": _controller(
+        "remember_failure is no method", "remember_failure = []", by="loader"
+    ),
+    "controller-as-detector": BadPlugIn(
+        kind="detector",
+        source=f"{SOUND_CONTROLLER}\n\nclass Bad(Sound):\n    pass\n",
+        said="detector plug-in lacks predict",
+        by="loader",
+    ),
+}
+"""Plug-ins that are refused when they are imported or made."""
+
+BAD_PLUG_INS: Mapping[str, BadPlugIn] = {**GUARDED, **LOADED}
 """All of them, by name."""

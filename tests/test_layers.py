@@ -17,7 +17,8 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "forking", "processes", "linear_algebra", "geometry", "paths", "outcome", "workspace",
+    "exceptions", "forking", "processes", "foreign_code",
+    "linear_algebra", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",

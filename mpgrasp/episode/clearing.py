@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from mpgrasp.controllers.controller import Controller
+from mpgrasp.controllers.controller import Controller, remember_failures
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode.basket import DROPS, Basket
 from mpgrasp.episode.config import ClearingConfig
@@ -152,10 +152,7 @@ class Clearing:
     def _pick(self) -> Pick:
         episode, driver, start = self.episode, self.episode.driver, self.time
         self.controller.reset(controller_seed(episode.seed, len(self.picks)))
-        remember = getattr(self.controller, "remember_failure", None)
-        if remember is not None:
-            for position in self._failed_at:
-                remember(position)
+        remember_failures(self.controller, self._failed_at)
         result = episode.attempt(reach(episode, self.controller))
         if result.success:
             self._carry()

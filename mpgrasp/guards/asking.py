@@ -13,6 +13,7 @@ from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import PlugInError
+from mpgrasp.foreign_code import working_directory
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.guards.command import check_command, check_diagnostics, check_final_grasp
@@ -68,10 +69,10 @@ def same_directory(name: str) -> Iterator[None]:
 
     Files that are named relative to it would be written elsewhere from then on.
     """
-    before = os.getcwd()
+    before = working_directory()
     yield
-    after = os.getcwd()
-    if after != before:
+    after = working_directory()
+    if before is not None and after != before:
         os.chdir(before)
         raise PlugInError(
             f"{name}: changed the working directory", got=after, allowed="none; open files by path"

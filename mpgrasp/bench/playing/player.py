@@ -11,6 +11,7 @@ from mpgrasp.bench.playing.cast import Cast
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.trace_recorder import TraceRecorder
 from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
+from mpgrasp.controllers.controller import remembers_failures
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError, PlugInError
 from mpgrasp.recording.recorder import NullRecorder, Recorder
@@ -54,9 +55,10 @@ class Player:
         self._run_episode = run_episode or real_games()
 
     def prepare(self) -> list[str]:
-        """Have networks compiled now, once for all workers; a line for people of each that was.
+        """Have networks compiled now, once for all workers; lines for people about that and about who plays.
 
         Raises:
+            PlugInError: a detector that cannot get ready.
             ConfigError: settings of a later suite that a plug-in refuses, or a detector that reads colour
                 with a camera that has none.
         """
@@ -68,7 +70,8 @@ class Player:
                 raise ConfigError(
                     f"{name} reads colour, which takes OpenGL", got=f"camera {self.plan.camera}", allowed="gl"
                 )
-        return [line for line in map(prepare, self.detectors.values()) if line]
+        ready = [line for line in map(prepare, self.detectors.values()) if line]
+        return ready + self._forgetful()
 
     def play(self, task: Task) -> PlayedLine:
         """The line of one episode, to go to episodes.jsonl.
@@ -98,6 +101,16 @@ class Player:
         except (Exception, SystemExit) as error:  # a plug-in that exits must not end the run
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
         return line
+
+    def _forgetful(self) -> list[str]:
+        """Return a line for people on each controller that will try what has failed again and again."""
+        if not any(suite.trial == "clear" for suite in self.plan.suites):
+            return []
+        return [
+            f"note: {name} has no remember_failure(position): where a grasp failed it may try the same again"
+            for name, controller in self.controllers.items()
+            if not remembers_failures(controller)
+        ]
 
     def _trace(self, task: Task) -> TraceRecorder | None:
         folder = self.plan.traces

@@ -26,6 +26,7 @@ from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
+from mpgrasp.foreign_code import load_limit
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
 
 HANG_AFTER: Mapping[str, float] = {"grasp": 600.0, "clear": 3600.0}
@@ -142,7 +143,7 @@ class _Worker:
         with born_deaf():
             self._process.start()
         theirs.close()  # or the end of the worker would not be the end of the pipe
-        self._limit = START_LIMIT
+        self._limit = _start_limit()
         self._trace = ""
         self.ready = False
         self.task: Task | None = None
@@ -158,7 +159,7 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[str, Any]:
-        """(ready, None), (line, Line), (refused, error), (dead, what) or (broke, (what, traceback, certain))."""
+        """(ready, None), (line, Line), (broke, (what, trace, certain)), (refused, error) or (dead, what)."""
         if self.connection.poll():
             self.deadline = math.inf
             try:
@@ -183,6 +184,11 @@ class _Worker:
         os.close(self._log)
 
 
+def _start_limit() -> float:
+    """Wall-clock time that a worker may take to start [s]; plug-ins may be given more."""
+    return max(START_LIMIT, 2 * load_limit() + GRACE)
+
+
 def _cause(exitcode: int | None) -> str:
     if exitcode is None:
         return "closed its pipe and went on"
@@ -201,7 +207,7 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str)
         # open in both processes by now; unnamed, it cannot be left behind
         Path(log_name).unlink(missing_ok=True)
         faulthandler.enable(log)
-        faulthandler.dump_traceback_later(START_LIMIT, file=log)
+        faulthandler.dump_traceback_later(_start_limit(), file=log)
         try:
             player = Player(plan, run_episode)
             connection.send(("ready", None))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ from bench_runs import PLUG_INS, error_row, grasp_row, records
 
 from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.playing.patience import Patience
-from mpgrasp.bench.playing.player import EpisodeError
+from mpgrasp.bench.playing.player import EpisodeError, Player
 from mpgrasp.bench.record import ErrorLine, Line, line_of
 from mpgrasp.exceptions import PlugInError
+from mpgrasp.suite import load_suite
 
 
 def error(episode: int, what: str, **where: Any) -> Line:
@@ -93,3 +95,14 @@ def test_what_a_plug_in_prints_goes_to_standard_error(capsys: pytest.CaptureFixt
     printed = capsys.readouterr()
     assert "hello" not in printed.out
     assert printed.err.count("hello") == 2
+
+
+def test_whoever_clears_a_table_is_told_that_its_controller_forgets_failures() -> None:
+    def told(suite: str, controller: str) -> list[str]:
+        plan = replace(make_plan(controllers=(controller,)), suites=(load_suite(suite),))
+        return Player(plan, fakes.run_episode).prepare()
+
+    assert (
+        "fakes:FakeController has no remember_failure(position)" in told("stacked", "fakes:FakeController")[0]
+    )
+    assert told("stacked", "mppc") == told("thin", "fakes:FakeController") == []
