@@ -158,6 +158,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         Raises:
             ConfigError: an action that is not four finite numbers, or another thread than that of `reset`.
             gymnasium.error.ResetNeeded: there is no episode, or it is over.
+            PlugInError: what the detector returned cannot be used.
         """
         self._check_thread()
         episode = self._episode

@@ -48,3 +48,7 @@ class CameraError(MpgraspError):
 
 class OutputError(MpgraspError):
     """A directory or file that cannot be written."""
+
+
+class PlugInError(MpgraspError):
+    """What a detector or a controller returned or did that cannot be used; it names the one at fault."""

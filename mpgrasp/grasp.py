@@ -94,6 +94,12 @@ class GraspMap:
         shape = (self.intrinsics.height, self.intrinsics.width)
         arrays = ("quality", "angle", "width", "depth", *(() if self.measured is None else ("measured",)))
         for name in arrays:
+            if not isinstance(getattr(self, name), np.ndarray):
+                raise ConfigError(
+                    f"grasp map's {name} is no numpy array",
+                    got=type(getattr(self, name)),
+                    allowed="a numpy array; of a tensor of torch, tensor.detach().cpu().numpy()",
+                )
             if getattr(self, name).shape != shape:
                 raise ConfigError(
                     f"grasp map's {name} has the wrong size",

@@ -2,12 +2,15 @@
 
 A class given by import path is called with its settings by keyword, if any are given for it, and, where
 weights are given for it, with `weights=Path(...)`. It must offer the methods of `GraspDetector` or of
-`Controller`.
+`Controller`. What its module or its constructor does beyond that, such as exit or hang, becomes an error
+(`foreign_code`).
 """
 
 from __future__ import annotations
 
 import importlib
+import inspect
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,13 +18,25 @@ from typing import TYPE_CHECKING, Any
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
+from mpgrasp.foreign_code import contained
 
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
     from mpgrasp.detectors import DetectorConfig
 
-_DETECTOR_METHODS = ("reset", "predict")
-_CONTROLLER_METHODS = ("reset", "update", "final_grasp", "diagnostics")
+_Calls = Mapping[str, Sequence[str]]
+
+_DETECTOR_CALLS: _Calls = {"reset": ["truth"], "predict": ["frame"]}
+_CONTROLLER_CALLS: _Calls = {
+    "reset": ["seed"],
+    "update": ["observation"],
+    "final_grasp": [],
+    "diagnostics": [],
+}
+_OPTIONAL_CALLS: _Calls = {"remember_failure": ["position"], "warm_up": []}
+"""Methods that a plug-in may offer, and what they are called with."""
+
+_IMPORT_PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
 def detector_names() -> tuple[str, ...]:
@@ -40,8 +55,22 @@ def controller_names() -> tuple[str, ...]:
 
 def check_name(kind: str, name: str, known: Iterable[str]) -> None:
     """Raise ConfigError unless the name is in the registry or has the form of an import path."""
-    if ":" not in name and name not in known:
+    module, separator, class_name = name.partition(":")
+    file = module.endswith(".py") or "/" in module or "\\" in module
+    if not separator and name not in known and not file:
         raise ConfigError(f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class"])
+    if file:
+        path = Path(module)
+        where = "" if path.parent == Path() else f" with PYTHONPATH={path.parent} or"
+        raise ConfigError(
+            f"{kind} plug-in is named by its module, not by its file",
+            got=name,
+            allowed=f"{path.stem}:{class_name or 'Class'}{where} from the folder of {path.name}",
+        )
+    if separator and not _IMPORT_PATH.fullmatch(name):
+        raise ConfigError(
+            f"{kind} plug-in has no such name", got=name, allowed="module:Class, package.module:Class"
+        )
 
 
 def load_detector(
@@ -82,7 +111,7 @@ def load_detector(
             ) from error
     assert settings is None or isinstance(settings, Mapping)
     arguments = {**(settings or {}), **({} if weights is None else {"weights": weights})}
-    plug_in: GraspDetector = _make("detector", name, arguments, _DETECTOR_METHODS)
+    plug_in: GraspDetector = _make("detector", name, arguments, _DETECTOR_CALLS)
     return plug_in
 
 
@@ -103,7 +132,7 @@ def load_controller(name: str, settings: ReachConfig | Mapping[str, Any] | None 
         assert not isinstance(settings, Mapping)
         return make_controller(name, settings)
     assert settings is None or isinstance(settings, Mapping)
-    plug_in: Controller = _make("controller", name, settings or {}, _CONTROLLER_METHODS)
+    plug_in: Controller = _make("controller", name, settings or {}, _CONTROLLER_CALLS)
     return plug_in
 
 
@@ -125,9 +154,13 @@ def plug_in_class(kind: str, path: str) -> Callable[..., Any]:
     Raises:
         ConfigError: it cannot be imported.
     """
+    check_name(kind, path, ())
     module_name, _, class_name = path.partition(":")
     try:
-        module = importlib.import_module(module_name)
+        with contained(f"the import of a {kind} plug-in", path):
+            module = importlib.import_module(module_name)
+    except MpgraspError:
+        raise
     except Exception as error:
         raise ConfigError(
             f"{kind} plug-in cannot be imported ({type(error).__name__}: {error})",
@@ -136,17 +169,21 @@ def plug_in_class(kind: str, path: str) -> Callable[..., Any]:
         ) from error
     factory = getattr(module, class_name, None)
     if not callable(factory):
-        names = [n for n, item in vars(module).items() if isinstance(item, type) and not n.startswith("_")]
-        raise ConfigError(f"{kind} plug-in's module has no class {class_name!r}", got=path, allowed=names)
+        classes = {n: item for n, item in vars(module).items() if isinstance(item, type) and n[0] != "_"}
+        names = [n for n, item in classes.items() if item.__module__ == module.__name__] or [*classes]
+        raise ConfigError(
+            f"{kind} plug-in's module has no class {class_name!r}", got=path, allowed=names or "a class"
+        )
     found: Callable[..., Any] = factory
     return found
 
 
-def _make(kind: str, path: str, arguments: Mapping[str, Any], methods: Iterable[str]) -> Any:
+def _make(kind: str, path: str, arguments: Mapping[str, Any], calls: _Calls) -> Any:
     """Return an instance of the class at `module:Class`; what goes wrong in there becomes a ConfigError."""
     factory = plug_in_class(kind, path)
     try:
-        made = factory(**arguments)
+        with contained(f"the constructor of a {kind} plug-in", path):
+            made = factory(**arguments)
     except MpgraspError:
         raise
     except Exception as error:
@@ -156,12 +193,34 @@ def _make(kind: str, path: str, arguments: Mapping[str, Any], methods: Iterable[
             got=path,
             allowed=f"a class that can be called as {call}",
         ) from error
-    missing = [name for name in methods if not callable(getattr(made, name, None))]
+    missing = [name for name in calls if not callable(getattr(made, name, None))]
     if missing:
         raise ConfigError(
-            f"{kind} plug-in lacks {', '.join(missing)}", got=path, allowed=f"methods {', '.join(methods)}"
+            f"{kind} plug-in lacks {', '.join(missing)}", got=path, allowed=f"methods {', '.join(calls)}"
         )
+    for name, names in {**calls, **_OPTIONAL_CALLS}.items():
+        _check_call(f"{kind} plug-in's {name}", path, getattr(made, name, None), names)
     return made
+
+
+def _check_call(what: str, path: str, method: Any, arguments: Sequence[str]) -> None:
+    """Raise ConfigError if a method cannot be called with so many arguments."""
+    if method is None:
+        return
+    if not callable(method):
+        raise ConfigError(f"{what} is no method", got=path, allowed=f"({', '.join(arguments)})")
+    try:
+        signature = inspect.signature(method)
+    except (TypeError, ValueError):  # what is written in C may hide its parameters
+        return
+    try:
+        signature.bind(*arguments)
+    except TypeError as error:
+        raise ConfigError(
+            f"{what} cannot be called as it is ({error})",
+            got=f"{path}: {method.__name__}{signature}",
+            allowed=f"({', '.join(['self', *arguments])})",
+        ) from error
 
 
 def parse_weights(given: Sequence[str], detectors: Sequence[str]) -> dict[str, Path]:

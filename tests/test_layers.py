@@ -17,13 +17,14 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "names", "forking", "processes", "linear_algebra", "geometry", "paths", "outcome",
-    "workspace", "files", "command_line", "statistics",
+    "exceptions", "names", "forking", "processes", "foreign_code",
+    "linear_algebra", "geometry", "paths", "outcome", "workspace",
+    "files", "command_line", "statistics",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
-    "controllers", "motion", "recording", "episode",
+    "controllers", "guards", "motion", "recording", "episode",
     "suite", "plugins", "settings", "env", "inspection",
     "training.data", "training",
     "bench.record", "bench.analysis", "bench.results", "bench.report", "bench.meshes",

@@ -81,6 +81,12 @@ class ReachConfig:
                 raise ConfigError(
                     f"unusable {name}", got=value, allowed="> 0" if name in positive else ">= 0"
                 )
+        if self.gripper_open > hand.GRIPPER_MAX_WIDTH:
+            raise ConfigError(
+                "unusable gripper_open",
+                got=self.gripper_open,
+                allowed=f"up to the hand's {hand.GRIPPER_MAX_WIDTH} m",
+            )
         for name in ("alpha", "peak_threshold", "min_quality"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"unusable {name}", got=getattr(self, name), allowed="0 to 1")

@@ -1,10 +1,14 @@
-"""The protocol of every reaching controller: a view in, a Cartesian velocity out, and in the end a grasp."""
+"""The protocol of every reaching controller: a view in, a Cartesian velocity out, and in the end a grasp.
+
+`Controller` is what each must have, `ControllerExtras` what it may have besides, each by itself. Nothing else
+of a controller is ever called or read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
@@ -54,3 +58,29 @@ class Controller(Protocol):
     def diagnostics(self) -> Mapping[str, FloatArray | float | bool]:
         """Return grids (ny, nx) and scalars that the controller looked at last, for recordings."""
         ...
+
+
+class ControllerExtras(Protocol):
+    """What a controller may have besides."""
+
+    @property
+    def config(self) -> Any:
+        """Settings, for run.json: a dataclass, or plain values."""
+        ...
+
+    def remember_failure(self, position: FloatArray) -> None:
+        """Grasp elsewhere than at world (3,) [m], where it failed; told after each `reset`, oldest first."""
+        ...
+
+
+def remembers_failures(controller: Controller) -> bool:
+    """True if a controller wants to know where grasps have failed on a table that is being cleared."""
+    return hasattr(controller, "remember_failure")
+
+
+def remember_failures(controller: Controller, positions: Iterable[FloatArray]) -> None:
+    """Tell a controller that `remembers_failures` where (3,) [m] they were, oldest first; no other one."""
+    remember = getattr(controller, "remember_failure", None)
+    if remember is not None:
+        for position in positions:
+            remember(position)

@@ -54,7 +54,7 @@ class NetworkDetector:
         self.name = weights.name
         self.weights = weights
         self.config = config or NetworkDetectorConfig()
-        self.reads_colour = weights.input.reads_colour
+        self.reads_truth, self.reads_colour = False, weights.input.reads_colour
         self._asked = runtime
         self._runtime: Runtime | None = None
         self._name = runtime_name(runtime) if isinstance(runtime, str) else runtime.name

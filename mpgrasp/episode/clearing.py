@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from mpgrasp.controllers.controller import Controller
+from mpgrasp.controllers.controller import Controller, remember_failures
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.episode.basket import DROPS, Basket
 from mpgrasp.episode.config import ClearingConfig
@@ -21,6 +21,7 @@ from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.guards.asking import ask_final_grasp
 from mpgrasp.motion.arm_driver import OnTick
 from mpgrasp.motion.reflex import Reflex
 from mpgrasp.motion.trajectory import path_profile
@@ -63,6 +64,7 @@ def run_clearing(
         ConfigError: a scene without a basket, or one that cannot be built.
         CameraError: a camera backend that this machine does not have, or that has no colour for a detector
             that reads it.
+        PlugInError: what the detector or the controller returned cannot be used.
     """
     config = config or ClearingConfig()
     require_basket(scene_config)
@@ -150,10 +152,7 @@ class Clearing:
     def _pick(self) -> Pick:
         episode, driver, start = self.episode, self.episode.driver, self.time
         self.controller.reset(controller_seed(episode.seed, len(self.picks)))
-        remember = getattr(self.controller, "remember_failure", None)
-        if remember is not None:
-            for position in self._failed_at:
-                remember(position)
+        remember_failures(self.controller, self._failed_at)
         result = episode.attempt(reach(episode, self.controller))
         if result.success:
             self._carry()
@@ -244,7 +243,7 @@ class Clearing:
 
     def _aim(self) -> FloatArray:
         """Point (3,) that a stopped reach was about [m]: its grasp so far, or the place under the camera."""
-        grasp, frame = self.controller.final_grasp(), self.episode.frame
+        grasp, frame = ask_final_grasp(self.controller), self.episode.frame
         if grasp is not None:
             return grasp.position
         assert frame is not None, "a reach looks before it moves"

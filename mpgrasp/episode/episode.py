@@ -25,6 +25,7 @@ from mpgrasp.episode.stages import StageClock
 from mpgrasp.episode.world import World
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
+from mpgrasp.guards.asking import ask_controller, ask_detector, ask_diagnostics, ask_final_grasp
 from mpgrasp.linear_algebra import norm
 from mpgrasp.motion.arm_driver import ArmDriver
 from mpgrasp.motion.execution import execute_grasp
@@ -59,6 +60,7 @@ def run_episode(
         ConfigError: a scene that cannot be built.
         CameraError: a camera backend that this machine does not have, or that has no colour for a detector
             that reads it.
+        PlugInError: what the detector or the controller returned cannot be used.
     """
     episode = Episode(scene_config, seed, detector=detector, config=config, recorder=recorder)
     try:
@@ -73,11 +75,11 @@ def reach(episode: Episode, controller: Controller) -> Grasp | None:
     while episode.interruption() is None:
         observation = episode.look()
         with episode.timed("control"):
-            command = controller.update(observation)
-        episode.act(command, controller.diagnostics())
+            command = ask_controller(controller, observation)
+        episode.act(command, ask_diagnostics(controller))
         if command.done:
             break
-    return controller.final_grasp() if episode.interruption() is None else None
+    return ask_final_grasp(controller) if episode.interruption() is None else None
 
 
 class Episode:
@@ -222,9 +224,9 @@ class Episode:
         A detector that knows the world's shape is told the true pose, and so errs by the calibration as well.
         """
         if not reads_truth(self.detector):
-            return self.detector.predict(frame)
+            return ask_detector(self.detector, frame)
         true = replace(frame, T_world_camera=self.camera.pose(self.simulation.data))
-        return replace(self.detector.predict(true), T_world_camera=frame.T_world_camera)
+        return replace(ask_detector(self.detector, true), T_world_camera=frame.T_world_camera)
 
     def _delay(self) -> int:
         """Time after which what was seen last acts [ticks of the velocity loop]."""

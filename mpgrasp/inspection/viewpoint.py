@@ -13,6 +13,7 @@ from mpgrasp.detectors.detector import GraspDetector, reads_colour, reads_truth
 from mpgrasp.episode.episode import Episode
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspMap
+from mpgrasp.guards.asking import ask_detector
 from mpgrasp.height_map import HeightMap
 from mpgrasp.inspection.pictures import Prediction
 from mpgrasp.suite import Suite, episode_seed, load_suite
@@ -107,7 +108,7 @@ def timed_prediction(name: str, detector: GraspDetector, frame: DepthFrame) -> P
     milliseconds = []
     for _ in range(1 + _REPEATS):
         clock = time.perf_counter()
-        grasp_map = detector.predict(frame)
+        grasp_map = ask_detector(detector, frame)
         milliseconds.append(1e3 * (time.perf_counter() - clock))
     return Prediction(
         name=name,

@@ -12,6 +12,7 @@ from toy_views import Blob, flat_map, fly
 
 from mpgrasp.controllers import CONTROLLERS, make_controller
 from mpgrasp.controllers.config import PRESETS, ReachConfig, preset
+from mpgrasp.controllers.controller import ControllerExtras, remember_failures, remembers_failures
 from mpgrasp.controllers.grid_map import GridConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
@@ -162,3 +163,27 @@ def test_diagnostics_are_grids_of_the_map_and_scalars(name: str) -> None:
     assert {"mean_quality", "best_quality"} <= entries.keys()
     for entry in entries.values():
         assert isinstance(entry, bool | float) or np.shape(entry) == GridConfig().shape
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_projects_controllers_remember_failures(name: str) -> None:
+    controller: Any = make_controller(name)
+    extras: ControllerExtras = controller
+    assert remembers_failures(controller)
+    assert extras.config == settings_of(name)
+
+
+def test_failures_are_told_oldest_first_to_those_alone_that_want_to_know() -> None:
+    class Remembers:
+        def __init__(self) -> None:
+            self.told: list[float] = []
+
+        def remember_failure(self, position: np.ndarray) -> None:
+            self.told.append(position[0])
+
+    one: Any = Remembers()
+    remember_failures(one, [np.array([x, 0, 0]) for x in (0.4, 0.5)])
+    assert one.told == [0.4, 0.5]
+    other: Any = object()
+    assert not remembers_failures(other)
+    remember_failures(other, [np.zeros(3)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,20 @@ import pytest
 from height_maps import Solid, height_map
 from toy_networks import INTRINSICS, frame, weight_files
 
+import mpgrasp
+from mpgrasp.controllers.controller import Controller, ControllerExtras
 from mpgrasp.detectors import DETECTORS, make_detector
-from mpgrasp.detectors.detector import GraspDetector, prepare, reads_colour
+from mpgrasp.detectors.detector import (
+    DetectorExtras,
+    GraspDetector,
+    device_of,
+    prepare,
+    reads_colour,
+    runtime_of,
+)
+from mpgrasp.detectors.network_detector import NetworkDetector
+from mpgrasp.detectors.oracle import OracleDetector
+from mpgrasp.exceptions import PlugInError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.height_map import HeightMap
 
@@ -179,3 +192,38 @@ def test_only_networks_have_something_to_prepare(files: dict[str, Path | None]) 
     line = prepare(make_detector("ggcnn2", files["ggcnn2"], "torch"))
     assert line is not None
     assert line.startswith("ggcnn2: torch f32")
+
+
+READ = re.compile(r"(?:getattr|hasattr)\((?:self\.)?(detector|controller), \"(\w+)\"")
+
+
+def test_whatever_is_read_of_a_detector_or_a_controller_is_declared() -> None:
+    declared = {
+        "detector": {*members(GraspDetector), *members(DetectorExtras)},
+        "controller": {*members(Controller), *members(ControllerExtras)},
+    }
+    files = Path(mpgrasp.__file__).parent.rglob("*.py")
+    read = {found for path in files for found in READ.findall(path.read_text(encoding="utf-8"))}
+    assert {("detector", "warm_up"), ("controller", "remember_failure")} <= read
+    assert not {(who, name) for who, name in read if name not in declared[who]}
+
+
+def members(protocol: type) -> set[str]:
+    return {name for name in (*vars(protocol), *protocol.__annotations__) if name[0] != "_"}
+
+
+def test_networks_have_all_that_a_detector_may_have(files: dict[str, Path | None]) -> None:
+    network = NetworkDetector.load("ggcnn2", files["ggcnn2"], runtime="torch")
+    extras: DetectorExtras = network
+    assert (runtime_of(network), device_of(network)) == (extras.runtime, extras.device)
+    oracle = make_detector("oracle")
+    assert runtime_of(oracle) is device_of(oracle) is None
+
+
+def test_a_detector_that_cannot_get_ready_says_why() -> None:
+    class NoEngine(OracleDetector):
+        def warm_up(self) -> float:
+            raise RuntimeError("no engine")
+
+    with pytest.raises(PlugInError, match="detector oracle cannot get ready: RuntimeError: no engine"):
+        prepare(NoEngine())

@@ -126,7 +126,7 @@ def test_the_first_call_is_told_apart_from_the_warm_ones() -> None:
 
         def predict(self, frame: DepthFrame) -> GraspMap:
             self.calls += 1
-            return grasp_map(EMPTY + self.calls)
+            return grasp_map(EMPTY + self.calls / 100)
 
     counts = Counts()
     counts.reset(height_map())

@@ -35,7 +35,8 @@ class Crew(Protocol):
         Args:
             tasks: in the order in which they are begun.
             sink: takes each line as soon as it is finished; an episode that could not be played in
-                `ATTEMPTS` attempts has a line too (`player.error_line`).
+                `ATTEMPTS` attempts, or at once where a plug-in returned what cannot be used, has a line
+                too (`player.error_line`).
             note: is told in words of every episode that is tried again, and of recordings that are lost.
 
         Raises:
@@ -101,8 +102,10 @@ class _ThisProcess:
                 return self._player.play(task)
             except EpisodeError as error:
                 troubles.append((str(error), traceback.format_exc()))
-                if len(troubles) < ATTEMPTS:
-                    note(f"{error}; it is played again")
                 # an error may leave a detector behind in a state that the next episode must not see
                 self._player = Player(self._plan, self._run_episode)
+                if error.certain:
+                    break
+                if len(troubles) < ATTEMPTS:
+                    note(f"{error}; it is played again")
         return error_line(self._plan, task, troubles)

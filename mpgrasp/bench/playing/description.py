@@ -114,7 +114,7 @@ def _part(plan: Plan, suite: Suite, player: Player) -> SuitePart:
 
 def _detector_card(plan: Plan, name: str, detector: GraspDetector) -> DetectorCard:
     from mpgrasp.bench.results.provenance import sha256
-    from mpgrasp.detectors.detector import reads_truth
+    from mpgrasp.detectors.detector import device_of, reads_truth, runtime_of
     from mpgrasp.paths import WEIGHTS
 
     given = plan.weights.get(name)
@@ -124,8 +124,8 @@ def _detector_card(plan: Plan, name: str, detector: GraspDetector) -> DetectorCa
         # of the shipped weights where none are given; a plug-in's own are its own affair
         sha256=sha256(given or WEIGHTS / f"{name}.safetensors"),
         reads_truth=reads_truth(detector),
-        device=json_value(getattr(detector, "device", None)),
-        runtime=json_value(getattr(detector, "runtime", None)),
+        device=json_value(device_of(detector)),
+        runtime=json_value(runtime_of(detector)),
         config=json_value(getattr(detector, "config", None)),
         source=source_hash("detector", name),
     )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
 from typing import Any
 
 from mpgrasp.bench.playing.cast import Cast
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.trace_recorder import TraceRecorder
 from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
+from mpgrasp.controllers.controller import remembers_failures
 from mpgrasp.detectors.detector import prepare, reads_colour
-from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError
+from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError, PlugInError
 from mpgrasp.recording.recorder import NullRecorder, Recorder
 from mpgrasp.suite import episode_seed
 
@@ -23,6 +26,11 @@ Games = RunEpisode | Mapping[str, RunEpisode]
 
 class EpisodeError(MpgraspError):
     """An episode that could not be played to its end, by a fault in a detector, controller or mpgrasp."""
+
+    @property
+    def certain(self) -> bool:
+        """True if another attempt would end in the same way: what was returned cannot be used."""
+        return isinstance(self.__cause__, PlugInError)
 
 
 class Player:
@@ -49,9 +57,10 @@ class Player:
         """Recordings and traces of the last episode that could not be written, and why."""
 
     def prepare(self) -> list[str]:
-        """Have networks compiled now, once for all workers; a line for people of each that was.
+        """Have networks compiled now, once for all workers; lines for people about that and about who plays.
 
         Raises:
+            PlugInError: a detector that cannot get ready.
             ConfigError: settings of a later suite that a plug-in refuses, or a detector that reads colour
                 with a camera that has none.
         """
@@ -63,7 +72,8 @@ class Player:
                 raise ConfigError(
                     f"{name} reads colour, which takes OpenGL", got=f"camera {self.plan.camera}", allowed="gl"
                 )
-        return [line for line in map(prepare, self.detectors.values()) if line]
+        ready = [line for line in map(prepare, self.detectors.values()) if line]
+        return ready + self._forgetful()
 
     def play(self, task: Task) -> PlayedLine:
         """The line of one episode, to go to episodes.jsonl.
@@ -77,20 +87,31 @@ class Player:
         suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
         run_episode = games if callable(games) else games[suite.trial]
         try:
-            result = run_episode(
-                suite.scene_config(task.episode),
-                episode_seed(suite.name, self.plan.seed, task.episode),
-                detector=self._cast.detector(task.detector, task.suite),
-                controller=self._cast.controller(task.controller, task.suite),
-                config=self.episode_configs[suite.name],
-                recorder=self._recorder(task, trace),
-            )
+            with redirect_stdout(sys.stderr):  # standard output is for results, whatever a plug-in prints
+                result = run_episode(
+                    suite.scene_config(task.episode),
+                    episode_seed(suite.name, self.plan.seed, task.episode),
+                    detector=self._cast.detector(task.detector, task.suite),
+                    controller=self._cast.controller(task.controller, task.suite),
+                    config=self.episode_configs[suite.name],
+                    recorder=self._recorder(task, trace),
+                )
             line = line_of({**result.as_record(), **_which(self.plan, task)})
             assert not isinstance(line, ErrorLine), "no episode ends with the outcome of an error row"
             self._save(trace, line)
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a plug-in that exits must not end the run
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
         return line
+
+    def _forgetful(self) -> list[str]:
+        """Return a line for people on each controller that will try what has failed again and again."""
+        if not any(suite.trial == "clear" for suite in self.plan.suites):
+            return []
+        return [
+            f"note: {name} has no remember_failure(position): where a grasp failed it may try the same again"
+            for name, controller in self.controllers.items()
+            if not remembers_failures(controller)
+        ]
 
     def _trace(self, task: Task) -> TraceRecorder | None:
         folder = self.plan.traces

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.playing.crew import Crew, make_crew
 from mpgrasp.bench.playing.description import describe
+from mpgrasp.bench.playing.patience import Patience
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.planning import make_plan
 from mpgrasp.bench.playing.player import EpisodeError, Player
@@ -86,11 +87,13 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
     _refuse_others(plan, directory, before)
     progress.start(before)
     done = {line.task for line in played(before)}
+    patience = Patience()
 
     def sink(line: Line) -> None:
         with interrupts_wait():
             directory.append(line)
             progress.add(line)
+        patience.see(line)
 
     def play(tasks: list[Task]) -> None:
         crew.play([task for task in tasks if task not in done], sink, progress.note)

@@ -26,6 +26,7 @@ from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, loss_note
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
+from mpgrasp.foreign_code import load_limit
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
 
 HANG_AFTER: Mapping[str, float] = {"grasp": 600.0, "clear": 3600.0}
@@ -61,9 +62,9 @@ class WorkerPool:
         todo: deque[Task] = deque(tasks)
         troubles: dict[Task, list[tuple[str, str]]] = defaultdict(list)
 
-        def lost(task: Task, what: str, trace: str) -> None:
+        def lost(task: Task, what: str, trace: str, certain: bool = False) -> None:
             troubles[task].append((what, trace))
-            if len(troubles[task]) < self._attempts:
+            if len(troubles[task]) < self._attempts and not certain:
                 note(f"{what}; it is played again")
                 todo.appendleft(task)
             else:
@@ -147,7 +148,7 @@ class _Worker:
         with born_deaf():
             self._process.start()
         theirs.close()  # or the end of the worker would not be the end of the pipe
-        self._limit = START_LIMIT
+        self._limit = _start_limit()
         self._trace = ""
         self.ready = False
         self.task: Task | None = None
@@ -163,7 +164,10 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[str, Any]:
-        """(ready, None), (line, (Line, lost)), (broke, (what, trace)), (refused, error) or (dead, what)."""
+        """What it says: (ready, None), (line, (Line, lost)), (broke, (what, trace, certain)), (refused, error).
+
+        Or, where it says nothing: (dead, what).
+        """
         if self.connection.poll():
             self.deadline = math.inf
             try:
@@ -188,6 +192,11 @@ class _Worker:
         os.close(self._log)
 
 
+def _start_limit() -> float:
+    """Wall-clock time that a worker may take to start [s]; plug-ins may be given more."""
+    return max(START_LIMIT, 2 * load_limit() + GRACE)
+
+
 def _cause(exitcode: int | None) -> str:
     if exitcode is None:
         return "closed its pipe and went on"
@@ -206,7 +215,7 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str)
         # open in both processes by now; unnamed, it cannot be left behind
         Path(log_name).unlink(missing_ok=True)
         faulthandler.enable(log)
-        faulthandler.dump_traceback_later(START_LIMIT, file=log)
+        faulthandler.dump_traceback_later(_start_limit(), file=log)
         try:
             player = Player(plan, run_episode)
             connection.send(("ready", None))
@@ -218,7 +227,7 @@ def _work(connection: Connection, plan: Plan, run_episode: Games, log_name: str)
                     line = player.play(task)
                     connection.send(("line", (line, player.lost)))
                 except EpisodeError as error:
-                    connection.send(("broke", (str(error), traceback.format_exc())))
+                    connection.send(("broke", (str(error), traceback.format_exc(), error.certain)))
                     # an error may leave a detector behind in a state that the next episode must not see
                     player = Player(plan, run_episode)
         except MpgraspError as error:

@@ -1,0 +1,1 @@
+"""Guards of every run: what a detector or a controller returns is checked before it counts."""
