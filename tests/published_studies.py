@@ -131,3 +131,46 @@ def speed_up(network: str, runtime: str) -> float:
 def parameters_of(network: str) -> float:
     rows = [row["parameters"] for row in study("run-time")["rows"] if row["network"] == network]
     return float(rows[0]) / 1e6
+
+
+FACTOR_MEASURES = {
+    "success, points": "success",
+    "stops, points": "stop",
+    "drift, mm": "blind_drift_m",
+    "singular value, 1e-3": "min_singular_value",
+}
+
+
+def factor_effect(factor: str, column: str, thickness: float = 0.0) -> tuple[float, float, float]:
+    """Return an effect of the study of factors with its interval, over all sticks or those of one thickness."""
+    rows = study("controller-factors")["effects"]
+    wanted = {"name": factor.split("`")[1], "measure": FACTOR_MEASURES[column], "thickness_mm": thickness}
+    found = entry(rows, **wanted)
+    return found["effect"], found["low"], found["high"]
+
+
+def p_of_factor(name: str, measure: str) -> float:
+    """Return the corrected p of a factor's effect over all sticks."""
+    rows = study("controller-factors")["effects"]
+    return float(entry(rows, name=name, measure=measure, thickness_mm=0.0)["p_holm"])
+
+
+def factor_worlds() -> int:
+    return len({(row["thickness_mm"], row["world"]) for row in _factor_episodes()})
+
+
+def factor_rate(thickness: float, **levels: int) -> tuple[int, int]:
+    """Return the successes and the episodes of the runs with some factors at a level, -1 or 1."""
+    rows = [
+        row
+        for row in _factor_episodes()
+        if float(row["thickness_mm"]) == thickness
+        and all(int(float(row[name])) == level for name, level in levels.items())
+    ]
+    return sum(int(row["success"]) for row in rows), len(rows)
+
+
+@cache
+def _factor_episodes() -> list[dict[str, str]]:
+    with (RESULTS / "controller-factors" / "episodes.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

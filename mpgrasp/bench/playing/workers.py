@@ -164,9 +164,9 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[str, Any]:
-        """What it says: (ready, None), (line, (Line, lost)), (broke, (what, trace, certain)), (refused, error).
+        """(ready, None), (line, (Line, lost)), (broke, (what, trace, certain)), (refused, error).
 
-        Or, where it says nothing: (dead, what).
+        Or, of one that says nothing any more, (dead, what).
         """
         if self.connection.poll():
             self.deadline = math.inf
