@@ -142,7 +142,7 @@ FACTOR_MEASURES = {
 
 
 def factor_effect(factor: str, column: str, thickness: float = 0.0) -> tuple[float, float, float]:
-    """Return an effect of the study of factors with its interval, over all sticks or those of one thickness."""
+    """Return an effect of the study of factors with its interval, of all sticks or of one thickness."""
     rows = study("controller-factors")["effects"]
     wanted = {"name": factor.split("`")[1], "measure": FACTOR_MEASURES[column], "thickness_mm": thickness}
     found = entry(rows, **wanted)
