@@ -50,3 +50,17 @@ def test_every_attempt_of_every_seed_has_a_controller_seed_of_its_own() -> None:
     assert len(told) == 200
     assert seeds.controller_seed(4, 2) == seeds.controller_seed(4, 2)
     assert not told & set(range(20))
+
+
+@pytest.mark.parametrize("seed", [0, 5, 2**32 - 1])
+def test_streams_are_those_that_published_runs_were_drawn_from(seed: int) -> None:
+    drawn = {name: make(seed).random() for name, make in STREAMS.items()}
+    numbers = {"noise": 11, "start": 12, "calibration": 15, "pattern": 16, "patches": 17, "force": 18}
+    of_tick = {"noise", "force"}
+    assert drawn == {
+        name: np.random.default_rng([seed, number, 0] if name in of_tick else [seed, number]).random()
+        for name, number in numbers.items()
+    }
+    for attempt, stream in ((0, [seed, 13]), (3, [seed, 13, 3])):
+        expected = int(np.random.default_rng(stream).integers(4294967296))
+        assert seeds.controller_seed(seed, attempt) == expected
