@@ -30,11 +30,8 @@ def test_a_sample_is_drawn_by_the_seed_and_keeps_its_order() -> None:
 
 
 def test_shares_are_of_each_module_and_of_all() -> None:
-    rows = [{"module": name, "killed": killed} for name, killed in (("a", True), ("a", False), ("b", True))]
-        {"module": "a", "killed": True},
-        {"module": "a", "killed": False},
-        {"module": "b", "killed": True},
-    ]
+    tried = (("a", True), ("a", False), ("b", True))
+    rows = [{"module": name, "killed": killed} for name, killed in tried]
     shares = mutation.by_module(rows)
     assert {name: (share["count"], share["n"]) for name, share in shares.items()} == {
         "a": (1, 2), "b": (1, 1), "all": (2, 3),
