@@ -33,6 +33,7 @@ from short_training import (
     train,
 )  # fmt: skip
 
+from mpgrasp.command_line import COUNT, THREADS, number, whole
 from mpgrasp.exceptions import ConfigError
 
 if TYPE_CHECKING:
@@ -175,13 +176,43 @@ def _study(command: Sequence[str]) -> None:
     add("study", choices=STUDIES, help="which networks are compared")
     add("--data", metavar="DIR", type=Path, default=Path("data/train"), help="default: %(default)s")
     add("--held-out", metavar="DIR", type=Path, default=Path("data/val"), help="default: %(default)s")
-    add("--images", metavar="N", type=int, default=defaults.images, help="to train on (default: %(default)s)")
-    add("--judged", metavar="N", type=int, default=defaults.held_out, help="held out (default: %(default)s)")
-    add("--epochs", metavar="N", type=int, default=defaults.epochs, help="default: %(default)s")
-    add("--batch", metavar="N", type=int, default=defaults.batch, help="images a step (%(default)s)")
-    add("--lr", metavar="X", type=float, default=defaults.lr, help="highest learning rate (%(default)s)")
-    add("--seeds", metavar="N", type=int, default=1, help="trainings of each network (default: 1)")
-    add("--threads", metavar="N", type=int, default=os.cpu_count(), help="default: all cores (%(default)s)")
+    add(
+        "--images",
+        metavar="N",
+        type=whole(1, 10**9),
+        default=defaults.images,
+        help="to train on (default: %(default)s)",
+    )
+    add(
+        "--judged",
+        metavar="N",
+        type=whole(1, 10**9),
+        default=defaults.held_out,
+        help="held out (default: %(default)s)",
+    )
+    add("--epochs", metavar="N", type=COUNT, default=defaults.epochs, help="default: %(default)s")
+    add(
+        "--batch",
+        metavar="N",
+        type=whole(1, 65536),
+        default=defaults.batch,
+        help="images a step (%(default)s)",
+    )
+    add(
+        "--lr",
+        metavar="X",
+        type=number(0, 100, above=True),
+        default=defaults.lr,
+        help="highest learning rate (%(default)s)",
+    )
+    add("--seeds", metavar="N", type=whole(1, 100), default=1, help="trainings of each network (default: 1)")
+    add(
+        "--threads",
+        metavar="N",
+        type=THREADS,
+        default=os.cpu_count(),
+        help="default: all cores (%(default)s)",
+    )
     add("--out", metavar="DIR", type=Path, help="default: benchmarks/results/ablation-<study>")
     options = parser.parse_args(command)
     settings = Settings(

@@ -32,6 +32,7 @@ from study import (
     track,
 )
 
+from mpgrasp.command_line import COUNT, SEED
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import Grasp
 from mpgrasp.height_map import HeightMap
@@ -163,8 +164,8 @@ def _study(command: Sequence[str]) -> None:
         help="as the benchmark",
     )
     add("--episodes", metavar="K[,K]", required=True, help="numbers of episodes from 0, or FIRST:END")
-    add("--seed", metavar="S", type=int, default=0, help="of the run they belong to (default: 0)")
-    add("--grasps", metavar="N", type=int, default=512, help="in each world (default: %(default)s)")
+    add("--seed", metavar="S", type=SEED, default=0, help="of the run they belong to (default: 0)")
+    add("--grasps", metavar="N", type=COUNT, default=512, help="in each world (default: %(default)s)")
     add("--all", action="store_true", help="go on after the first that lifts")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/ceiling")
     options = parser.parse_args(command)

@@ -45,6 +45,7 @@ from study import (
 )
 
 from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.command_line import COUNT, SEED, THREADS
 from mpgrasp.controllers.config import MVP
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
@@ -155,11 +156,11 @@ def _study(command: Sequence[str]) -> None:
     parser = Parser(description=__doc__)
     add = parser.add_argument
     add("--detector", metavar="D", default="dhrnet", help="default: %(default)s")
-    add("--episodes", metavar="N", type=int, default=8, help="worlds of each thickness (default: 8)")
+    add("--episodes", metavar="N", type=COUNT, default=8, help="worlds of each thickness (default: 8)")
     add("--thickness", metavar="T[,T]", help="of the sticks [mm] (default: 1.5,2,3)")
-    add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
+    add("--seed", metavar="S", type=SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--camera", choices=BACKENDS, default="auto", help="default: %(default)s")
-    add("--workers", metavar="K", type=int, default=1, help="play in K processes (default: 1)")
+    add("--workers", metavar="K", type=THREADS, default=1, help="play in K processes (default: 1)")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/controller-factors")
     options = parser.parse_args(command)
     thicknesses = _thicknesses(options.thickness)

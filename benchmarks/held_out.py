@@ -25,6 +25,7 @@ import study
 from calibration import calibration, choose_threshold, draw_peaks, draw_reliability
 from single_view import Trial, execute, propose
 
+from mpgrasp.command_line import COUNT, SEED, THREADS
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.training.data.views import CAMERA_HEIGHT
 from mpgrasp.training.dataset import GraspDataset
@@ -151,9 +152,9 @@ def _study(command: Sequence[str]) -> None:
     add = parser.add_argument
     add("--data", metavar="DIR", type=Path, default=Path("data/test"), help="default: %(default)s")
     add("--detector", metavar="D[,D]", default="dhrnet,tfgrasp,ggcnn2", help="default: %(default)s")
-    add("--scenes", metavar="N", type=int, help="at most (default: all)")
-    add("--workers", metavar="N", type=int, default=os.cpu_count(), help="processes (default: all cores)")
-    add("--seed", metavar="S", type=int, default=0, help="of the bootstrap (default: 0)")
+    add("--scenes", metavar="N", type=COUNT, help="at most (default: all)")
+    add("--workers", metavar="N", type=THREADS, default=os.cpu_count(), help="processes (default: all cores)")
+    add("--seed", metavar="S", type=SEED, default=0, help="of the bootstrap (default: 0)")
     add("--out", metavar="DIR", type=Path, default=study.RESULTS / "held-out")
     options = parser.parse_args(command)
     study.positive("number of scenes or workers", options.scenes or 1, options.workers)

@@ -24,6 +24,7 @@ from timed_network import WIDE, Entry, available_runtimes, make_entry, network_s
 
 from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.camera.wrist_camera import WristCamera
+from mpgrasp.command_line import COUNT, SEED, THREADS
 from mpgrasp.depth import CROP, DepthFrame
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
@@ -143,10 +144,16 @@ def _study(command: Sequence[str]) -> None:
     parser = study.Parser(description=__doc__)
     add = parser.add_argument
     add("--network", metavar="N[,N]", help=f"default: all, and {WIDE}")
-    add("--rounds", metavar="N", type=int, default=30, help="images for each (default: %(default)s)")
-    add("--threads", metavar="N", type=int, default=os.cpu_count(), help="default: all cores (%(default)s)")
+    add("--rounds", metavar="N", type=COUNT, default=30, help="images for each (default: %(default)s)")
+    add(
+        "--threads",
+        metavar="N",
+        type=THREADS,
+        default=os.cpu_count(),
+        help="default: all cores (%(default)s)",
+    )
     add("--camera", choices=BACKENDS, default="auto", help="default: %(default)s")
-    add("--seed", metavar="S", type=int, default=0, help="of scenes and order (default: 0)")
+    add("--seed", metavar="S", type=SEED, default=0, help="of scenes and order (default: 0)")
     add("--out", metavar="DIR", type=Path, default=study.RESULTS / "run-time")
     options = parser.parse_args(command)
     study.positive("number of rounds or threads", options.rounds, options.threads)

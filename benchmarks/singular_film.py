@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from study import Parser, figure, not_negative, prepare, run_command, style
 
+from mpgrasp import command_line
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replacing
 from mpgrasp.geometry import FloatArray
@@ -162,8 +163,14 @@ def _against_time(axes: Axes, ways: dict[str, Way]) -> None:
 def _study(command: Sequence[str]) -> None:
     parser = Parser(description=__doc__)
     add = parser.add_argument
-    add("--episode", metavar="K", type=int, default=EPISODE, help=f"of {SUITE} (default: %(default)s)")
-    add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
+    add(
+        "--episode",
+        metavar="K",
+        type=command_line.EPISODE,
+        default=EPISODE,
+        help=f"of {SUITE} (default: %(default)s)",
+    )
+    add("--seed", metavar="S", type=command_line.SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--detector", metavar="D", default="dhrnet", help="default: %(default)s")
     add("--out", metavar="STEM", type=Path, default=OUT, help="files without ending (default: docs/singular)")
     options = parser.parse_args(command)

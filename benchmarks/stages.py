@@ -15,7 +15,7 @@ import resource
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -23,6 +23,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+
+from mpgrasp.command_line import COUNT, SEED, Parser, run_command
 
 BUDGET_MS = 25.0
 """For a whole tick without the detector, on 2 cores [ms]."""
@@ -149,20 +151,20 @@ def time_network(name: str, frames: list[Any]) -> float | None:
     return 1e3 * float(np.median(times[3:]))
 
 
-def main() -> int:
+def main(command: Sequence[str] | None = None) -> int:
     """Print the table; exit code 1 where a tick without detector, or memory, is over budget."""
+    return run_command(lambda: _measure(command))
+
+
+def _measure(command: Sequence[str] | None) -> int:
     from mpgrasp.camera.backends import BACKENDS
     from mpgrasp.detectors import DETECTORS
 
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--ticks", type=int, default=100, help="ticks to time (default: 100)")
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--ticks", type=COUNT, default=100, help="ticks to time (default: 100)")
     parser.add_argument("--camera", choices=BACKENDS, default="auto")
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    if arguments.ticks < 1 or arguments.seed < 0:
-        parser.error("--ticks must be 1 or more, --seed 0 or more")
+    parser.add_argument("--seed", type=SEED, default=0)
+    arguments = parser.parse_args(command)
 
     watch, frames, backend = play(arguments.ticks, arguments.camera, arguments.seed)
     memory_without_networks = _peak_memory()

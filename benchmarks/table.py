@@ -6,12 +6,14 @@ into docs/results.md. A test holds that documents and summaries say the same.
 
 from __future__ import annotations
 
-import argparse
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from mpgrasp.bench.analysis.summary import CellSummary
 from mpgrasp.bench.record import Cell
 from mpgrasp.bench.results.reader import read_summary
+from mpgrasp.command_line import Parser, run_command
 from mpgrasp.exceptions import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -95,11 +97,15 @@ def _line(*values: object) -> str:
     return "| " + " | ".join(str(value) for value in values) + " |"
 
 
-def main() -> None:
-    """Print the tables, or put them into the documents."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def main(command: Sequence[str] | None = None) -> int:
+    """Print the tables, or put them into the documents; return the exit code, 2 for bad input."""
+    return run_command(lambda: _write(command))
+
+
+def _write(command: Sequence[str] | None) -> int:
+    parser = Parser(description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"put them into {', '.join(DOCUMENTS)}")
-    write = parser.parse_args().write
+    write = parser.parse_args(command).write
     for name, paper in DOCUMENTS.items():
         if not write:
             print(f"{name}\n\n{table(paper=paper)}\n")
@@ -108,7 +114,8 @@ def main() -> None:
         before, rest = document.read_text(encoding="utf-8").split(BEGIN)
         after = rest.split(END)[1]
         document.write_text(f"{before}{BEGIN}\n\n{table(paper=paper)}\n\n{END}{after}", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -38,6 +38,7 @@ from study import (
 
 from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.camera.wrist_camera import WristCamera
+from mpgrasp.command_line import COUNT, SEED
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.depth import CROP
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
@@ -193,8 +194,8 @@ def _study(command: Sequence[str]) -> None:
     parser = Parser(description=__doc__)
     add = parser.add_argument
     add("--detector", metavar="D[,D]", default="dhrnet,tfgrasp,ggcnn2", help="default: %(default)s")
-    add("--scenes", metavar="N", type=int, default=40, help="per thickness and height (default: 40)")
-    add("--seed", metavar="S", type=int, default=0, help="0, 1, 2, ... (default: 0)")
+    add("--scenes", metavar="N", type=COUNT, default=40, help="per thickness and height (default: 40)")
+    add("--seed", metavar="S", type=SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--camera", choices=BACKENDS, default="auto", help="default: %(default)s")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/thickness")
     options = parser.parse_args(command)

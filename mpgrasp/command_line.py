@@ -72,6 +72,18 @@ def number(low: float, high: float, unit: str = "", *, above: bool = False) -> C
     return read
 
 
+COUNT = whole(1, 100_000)
+"""Type of an option that takes a number of episodes, scenes or the like: days of work for a hundred cores."""
+EPISODE = whole(0, 99_999)
+"""Type of an option that takes the number of an episode."""
+SEED = whole(0, LARGEST)
+"""Type of an option that takes a seed."""
+WORKERS = whole(0, 256)
+"""Type of an option that takes a number of processes, 0 for this one."""
+THREADS = whole(1, 256)
+"""Type of an option that takes a number of threads, or of processes that there must be."""
+
+
 def _path(text: str) -> Path:
     if not text.strip() or "\0" in text:
         raise argparse.ArgumentTypeError(f"unusable path; got {text!r}; allowed: a name, or . for here")

@@ -197,8 +197,6 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
         )
         for turn in found.turns
     )
-    if not all(scene.objects for scene in scenes):
-        raise ConfigError(f"{where}: a scene without objects", got="objects = []", allowed="one or more")
     suite = Suite(
         name=name,
         title=found.title,

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.command_line import Parser, run_command
+from mpgrasp.command_line import COUNT, EPISODE, SEED, Parser, number, run_command
 from mpgrasp.detectors.runtimes import RUNTIMES
 
 _RUNTIMES = "|".join(RUNTIMES)
@@ -61,9 +61,15 @@ def make_parser() -> argparse.ArgumentParser:
     add = show.add_argument
     add("detector", metavar="D[,D]", help="names, or your own as module:Class")
     add("--suite", default="thin", help="suite, or a path to a declaration.toml (default: thin)")
-    add("--seed", metavar="S", type=int, default=0, help="of the benchmark run (default: 0)")
-    add("--episode", metavar="K", type=int, default=0, help="of that run, from 0 (default: 0)")
-    add("--height", metavar="Z", type=float, default=0.5, help="of the tool [m] (default: 0.5)")
+    add("--seed", metavar="S", type=SEED, default=0, help="of the benchmark run (default: 0)")
+    add("--episode", metavar="K", type=EPISODE, default=0, help="of that run, from 0 (default: 0)")
+    add(
+        "--height",
+        metavar="Z",
+        type=number(0.1, 1.0, "m"),
+        default=0.5,
+        help="of the tool [m] (default: 0.5)",
+    )
     add(
         "--above-object",
         metavar="OBJECT",
@@ -91,8 +97,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("detector", metavar="NAME", help="a network's name")
     add("--runtime", metavar=_RUNTIMES, default="auto", help="what computes it (default: auto)")
     add("--suite", default="thin", help="whose scenes are looked at (default: thin)")
-    add("--frames", metavar="N", type=int, default=100, help="number of images (default: 100)")
-    add("--seed", metavar="S", type=int, default=0, help="of the scenes and views (default: 0)")
+    add("--frames", metavar="N", type=COUNT, default=100, help="number of images (default: 100)")
+    add("--seed", metavar="S", type=SEED, default=0, help="of the scenes and views (default: 0)")
     add("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")
     add("--camera", metavar="auto|gl|ray", default="auto", help="depth camera's backend (default: auto)")
     about = commands.add_parser("card", help="print the training card of weights", allow_abbrev=False)

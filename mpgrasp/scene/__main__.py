@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.command_line import Parser, run_command
+from mpgrasp.command_line import EPISODE, SEED, Parser, run_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,9 +20,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         description="Write the scene of a benchmark episode as XML for the plain MuJoCo viewer.",
     )
     parser.add_argument("suite", metavar="SUITE", help="name of a suite in benchmarks/")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the benchmark run (default 0)")
+    parser.add_argument("--seed", type=SEED, default=0, help="seed of the benchmark run (default 0)")
     parser.add_argument(
-        "--episode", type=int, default=0, help="number of the episode in that run (default 0)"
+        "--episode", type=EPISODE, default=0, help="number of the episode in that run (default 0)"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("scene.xml"), help="file to write (default scene.xml)"

@@ -59,6 +59,8 @@ class SceneConfig:
         for name in ("objects", "centre", "jitter"):  # declarations give lists
             object.__setattr__(self, name, tuple(getattr(self, name)))
         object.__setattr__(self, "pattern", tuple(tuple(place) for place in self.pattern))
+        if not self.objects:
+            raise ConfigError("a scene without objects", got="objects = []", allowed="one or more")
         if (n := len(self.objects) if self.count is None else self.count) > MAX_OBJECTS:
             raise ConfigError("too many objects", got=n, allowed=f"up to {MAX_OBJECTS}")
         if self.count is not None and not 1 <= self.count <= len(self.objects):

@@ -13,18 +13,23 @@ import os
 from pathlib import Path
 
 from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.command_line import SEED, WORKERS, whole
 from mpgrasp.training.data.generate_config import GenerateConfig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `python -m mpgrasp.training generate`."""
-    parser.add_argument("--scenes", type=int, default=1000, help="number of scenes (default: %(default)s)")
+    parser.add_argument(
+        "--scenes", type=whole(1, 10**7), default=1000, help="number of scenes (default: %(default)s)"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the shards go")
     parser.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
+        "--workers", type=WORKERS, default=os.cpu_count() or 1, help="processes (default: all cores)"
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the whole set (default: %(default)s)")
-    parser.add_argument("--views", type=int, default=4, help="images of each scene (default: %(default)s)")
+    parser.add_argument("--seed", type=SEED, default=1, help="of the whole set (default: %(default)s)")
+    parser.add_argument(
+        "--views", type=whole(1, 100), default=4, help="images of each scene (default: %(default)s)"
+    )
     parser.add_argument(
         "--camera", choices=BACKENDS, default="auto", help="camera backend (default: %(default)s)"
     )

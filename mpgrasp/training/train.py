@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mpgrasp.command_line import SEED, THREADS, number, whole
 from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
 from mpgrasp.detectors.networks.registry import NETWORKS, declaration
 from mpgrasp.exceptions import ConfigError
@@ -47,48 +48,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="depth, colour or both (default: %(default)s)",
     )
     add("--settings", default="{}", metavar="JSON", help="of the network, such as '{\"width\": 48}'")
-    add("--epochs", type=float, default=defaults.epochs, help="passes over the data (default: %(default)s)")
-    add("--minutes", type=float, help="time for everything, instead of epochs")
-    add("--batch", type=int, default=defaults.batch, help="images a step (default: %(default)s)")
-    add("--lr", type=float, default=defaults.lr, help="highest learning rate (default: %(default)s)")
+    add(
+        "--epochs",
+        type=number(0, 1e5, above=True),
+        default=defaults.epochs,
+        help="passes over the data (default: %(default)s)",
+    )
+    add("--minutes", type=number(0, 1e6, above=True), help="time for everything, instead of epochs")
+    add("--batch", type=whole(1, 65536), default=defaults.batch, help="images a step (default: %(default)s)")
+    add(
+        "--lr",
+        type=number(0, 100, above=True),
+        default=defaults.lr,
+        help="highest learning rate (default: %(default)s)",
+    )
     add("--schedule", default=defaults.schedule, help="cosine or constant (default: %(default)s)")
-    add("--weight-decay", type=float, default=defaults.weight_decay, help="AdamW's (default: %(default)s)")
-    add("--average", type=float, default=defaults.average, help="decay of the averaged weights, 0 = none")
-    add("--positive", type=float, default=loss.positive, help="extra weight of labelled pixels' quality")
-    add("--background", type=float, default=loss.background, help="weight of angle and width elsewhere")
-    add("--beta", type=float, default=loss.beta, help="bend of smooth-L1 (default: %(default)s)")
+    add(
+        "--weight-decay",
+        type=number(0, 100),
+        default=defaults.weight_decay,
+        help="AdamW's (default: %(default)s)",
+    )
+    add(
+        "--average",
+        type=number(0, 1),
+        default=defaults.average,
+        help="decay of the averaged weights, 0 = none",
+    )
+    add(
+        "--positive",
+        type=number(0, 1e6),
+        default=loss.positive,
+        help="extra weight of labelled pixels' quality",
+    )
+    add(
+        "--background",
+        type=number(0, 1e6),
+        default=loss.background,
+        help="weight of angle and width elsewhere",
+    )
+    add(
+        "--beta",
+        type=number(0, 1e6, above=True),
+        default=loss.beta,
+        help="bend of smooth-L1 (default: %(default)s)",
+    )
     add("--centre", default=image.centre, help="of the input's depth: mean or median (default: %(default)s)")
-    add("--scale", type=float, default=image.scale, help="input units a metre (default: %(default)s)")
+    add(
+        "--scale",
+        type=number(0, 1e6, above=True),
+        default=image.scale,
+        help="input units a metre (default: %(default)s)",
+    )
     add("--no-augmentation", action="store_true", help="images as they are")
     add(
         "--thin-weight",
-        type=float,
+        type=number(0, 1e6, above=True),
         default=defaults.thin_weight,
         help="how much oftener thin scenes are drawn",
     )
     add("--precision", default=defaults.precision, help="bfloat16 or float32 (default: %(default)s)")
-    add("--images", type=int, metavar="N", help="train on the first N images only")
-    add("--holdout", type=float, default=defaults.holdout, help="share of scenes to validate on")
+    add("--images", type=whole(1, 10**9), metavar="N", help="train on the first N images only")
+    add("--holdout", type=number(0, 1), default=defaults.holdout, help="share of scenes to validate on")
     add(
         "--validation-images",
-        type=int,
+        type=whole(0, 10**9),
         default=defaults.validation_images,
         help="validate on so many images (default: %(default)s)",
     )
     add(
         "--lift-images",
-        type=int,
+        type=whole(0, 10**9),
         default=defaults.lift_images,
         help="grasp so many of them in simulation, 0 = none (default: %(default)s)",
     )
     add(
         "--validate-every",
-        type=float,
+        type=number(0, 1e6, above=True),
         default=defaults.validate_every,
         help="share of the budget between validations (default: %(default)s)",
     )
-    add("--seed", type=int, default=defaults.seed, help="of weights, order and augmentation")
-    add("--threads", type=int, help="threads for the network (default: all cores)")
+    add("--seed", type=SEED, default=defaults.seed, help="of weights, order and augmentation")
+    add("--threads", type=THREADS, help="threads for the network (default: all cores)")
     add("--resume", action="store_true", help="continue from the checkpoint beside the weights file")
 
 
@@ -141,14 +182,14 @@ def _stopping(trainer: Trainer) -> Iterator[None]:
         trainer.stop()
         restore()
 
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {which: signal.getsignal(which) for which in (signal.SIGINT, signal.SIGTERM)}
 
     def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for which, handler in before.items():
+            signal.signal(which, handler)
 
-    for number in before:
-        signal.signal(number, stop)
+    for which in before:
+        signal.signal(which, stop)
     try:
         yield
     finally:

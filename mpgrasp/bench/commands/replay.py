@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace as replace_fields
 
 from mpgrasp.bench.record import Cell, ErrorLine, Line, PlayedLine, Task
-from mpgrasp.command_line import Parser
+from mpgrasp.command_line import EPISODE, Parser
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.json_values import difference, differences
 
@@ -40,7 +40,7 @@ def make_parser() -> Parser:
     )
     add = parser.add_argument
     add("run", metavar="RUN", type=Path, help="folder of the run")
-    add("--episode", metavar="K", type=int, required=True, help="number of the episode, counted from 0")
+    add("--episode", metavar="K", type=EPISODE, required=True, help="number of the episode, counted from 0")
     add(
         "--cell",
         metavar="[S/]D/C",

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.command_line import LARGEST, Parser, number, whole
+from mpgrasp.command_line import COUNT, SEED, WORKERS, Parser, number, whole
 from mpgrasp.exceptions import ConfigError
 
 _EPILOG = """\
@@ -39,9 +39,6 @@ exit code: 0 all episodes played, 1 some could not be played, 2 unusable input o
 (Ctrl-C); finished episodes are kept in every case.
 """
 
-MOST_EPISODES = 100_000
-"""Most episodes of each combination: days of work for a hundred cores."""
-MOST_WORKERS = 256
 LONGEST = 7 * 24 * 3600.0
 """Longest wall-clock time of an episode that can be waited for [s]: a week."""
 
@@ -86,14 +83,14 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add(
         "--baseline",
-        choices=tuple(Baseline),
+        choices=[baseline.value for baseline in Baseline],
         help="paper: play the controllers of one baseline alone, published (mvp and mppc) or robust "
         "(mvp_robust and mppc_robust); (default: both, which takes nearly twice as long)",
     )
     add(
         "--episodes",
         metavar="N",
-        type=whole(1, MOST_EPISODES),
+        type=COUNT,
         help="episodes of each combination (default: what the suite declares, the paper's number)",
     )
     add(
@@ -106,7 +103,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--max-episodes",
         metavar="M",
-        type=whole(1, MOST_EPISODES),
+        type=COUNT,
         default=1000,
         help="where --until-ci ends in any case (default: 1000)",
     )
@@ -128,7 +125,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
     add_settings(parser)
-    add("--seed", metavar="S", type=whole(0, LARGEST), default=0, help="0, 1, 2, ... (default: 0)")
+    add("--seed", metavar="S", type=SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
     add(
         "--resume",
@@ -140,7 +137,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--record",
         metavar="N",
-        type=whole(0, MOST_EPISODES),
+        type=whole(0, 100_000),
         default=0,
         help="record the first N episodes of each combination, for rerun, as GIF and as MP4 (default: 0)",
     )
@@ -168,7 +165,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--workers",
         metavar="K",
-        type=whole(0, MOST_WORKERS),
+        type=WORKERS,
         default=len(os.sched_getaffinity(0)),
         help="play in K processes (default: one per core); 0 plays in this one, for debuggers",
     )

@@ -46,6 +46,8 @@ def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
             continue
         path = Path(word)
         try:
+            if not word.strip():  # it would be the current folder
+                raise ValueError(word)
             kind = path.stat().st_mode
         except (OSError, ValueError):  # not there, or a name that no file can have
             raise ConfigError(

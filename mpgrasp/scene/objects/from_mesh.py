@@ -154,7 +154,8 @@ def read_body(path: Path) -> MeshBody:
     result = load_result("meshes", key, CachedBody)
     if result is None:
         try:
-            pieces, volume = _make_body(load_surface(_content(path), path.suffix.lower()))
+            with np.errstate(divide="ignore", invalid="ignore"):  # flat surfaces have no centre of mass
+                pieces, volume = _make_body(load_surface(_content(path), path.suffix.lower()))
             result = CachedBody(pieces=[piece.tolist() for piece in pieces], volume=volume)
         except AssetError as error:
             result = CachedBody(refused=str(error))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -37,26 +39,30 @@ def load_surface(content: bytes, suffix: str) -> Any:
     empty = AssetError("mesh is empty", allowed="at least 4 vertices and their faces")
     if not content.strip():
         raise empty
-    if suffix == ".stl":
-        _check_stl(content)
-    else:
+    _CHECKS[suffix](content)
+    if suffix != ".stl":
         content = _as_utf8(content, suffix)
     try:
-        loaded = trimesh.load(io.BytesIO(content), file_type=suffix[1:], force="mesh")
+        # as it is: a vertex that is no number would be left out, and a mesh that is far too small be a point
+        loaded = trimesh.load(io.BytesIO(content), file_type=suffix[1:], force="mesh", process=False)
     except Exception as error:  # each file type fails in its own way
         what = " ".join(f"{type(error).__name__}: {error}".split())[:120]
         raise AssetError(f"unreadable {suffix[1:].upper()} file ({what})") from None
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0 or len(loaded.vertices) < 4:
         raise empty
-    if not np.isfinite(loaded.vertices).all():
+    n = len(loaded.vertices)
+    if loaded.faces.min() < (-n if suffix == ".obj" else 0) or loaded.faces.max() >= n:  # OBJ counts back too
+        raise AssetError("mesh has faces between vertices that it does not have")
+    corners = np.asarray(loaded.vertices, float)[loaded.faces].reshape(-1, 3)
+    if not np.isfinite(corners).all():
         raise AssetError("mesh has vertices that are not numbers")
+    _check_size(float(np.ptp(corners, axis=0).max()))
     # a new mesh without texture: where colour or normals change, files have each vertex twice
     mesh = trimesh.Trimesh(loaded.vertices, loaded.faces, process=True)
     a, b, c = mesh.faces.T
     mesh.update_faces((a != b) & (b != c) & (c != a))
     if len(mesh.faces) == 0:
         raise empty
-    _check_size(float(mesh.extents.max()))
     return mesh
 
 
@@ -76,6 +82,27 @@ def _check_stl(content: bytes) -> None:
     )
 
 
+def _check_obj(content: bytes) -> None:
+    """Raise AssetError for a face of vertex 0, which would be taken for the last, or a vertex in a plane."""
+    if re.search(rb"^[ \t]*f[ \t](?:.*[ \t])?0+(?:/|\s|$)", content, re.MULTILINE):
+        raise AssetError("OBJ has a face of vertex 0", allowed="1 for the first vertex, -1 for the last")
+    if re.search(rb"^[ \t]*v(?:[ \t]+\S+){0,2}[ \t]*\r?$", content, re.MULTILINE):
+        raise AssetError("OBJ has a vertex without three coordinates")
+
+
+def _check_ply(content: bytes) -> None:
+    """Raise AssetError for a text PLY with fewer lines than its header says, of which the rest is cut off."""
+    head, found, body = content.partition(b"end_header")
+    if not content.startswith(b"ply") or not found:
+        raise AssetError("PLY without its header", allowed="a file that begins with ply, up to end_header")
+    counts = [int(count) for count in re.findall(rb"^element[ \t]+\S+[ \t]+(\d+)", head, re.MULTILINE)]
+    lines = len(body.split(b"\n", 1)[-1].strip().splitlines())
+    if b"format ascii" in head and lines < sum(counts):
+        raise AssetError(
+            "text PLY is cut off", got=f"{lines} lines", allowed=f"{sum(counts)}, as its header says"
+        )
+
+
 def _as_utf8(content: bytes, suffix: str) -> bytes:
     """Return the content of a text file in UTF-8, comments and names in Latin-1 included."""
     end = content.find(b"end_header") if suffix == ".ply" else -1
@@ -85,6 +112,10 @@ def _as_utf8(content: bytes, suffix: str) -> bytes:
     except UnicodeDecodeError:
         head = head.decode("latin-1").encode("utf-8")
     return head + rest
+
+
+_CHECKS: dict[str, Callable[[bytes], None]] = {".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl}
+"""What a reader of files would not notice, by type."""
 
 
 def _check_size(edge: float) -> None:
