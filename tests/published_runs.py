@@ -21,6 +21,12 @@ NAMES = {"DHRNet": "dhrnet", "TF-Grasp": "tfgrasp", "GG-CNN": "ggcnn", "GG-CNN2"
 THICKNESS = ("dhrnet", "tfgrasp", "ggcnn2")
 """Detectors of the run `closed-thickness`."""
 REAL_CELL = "real-cell/"
+RUNGS: dict[str, tuple[str, str | None]] = {
+    **{f"{mm} mm": (f"oracle/stick-{mm}mm", None) for mm in ("1", "1.5", "2", "3")},
+    **{f"cloth {mm} mm": ("oracle/cloth", f"thin[cloth_unevenness=0.00{mm}]") for mm in (2, 3, 4)},
+    "single": ("oracle/single", None),
+}
+"""Runs of the oracle by the rung's name in docs/results.md, and the suite in them where there are several."""
 PARTS, BY_MEAN = "controller-parts/stacked", "benchmarks.controller_parts:MppcByMean"
 TIME_LIMIT = 900.0
 """Simulated time that a table which was not cleared counts as [s]."""
@@ -210,7 +216,24 @@ def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
         "least singular value": least_singular_value,
         "blind drift, mm": blind_drift,
     }
-    return measures[column](f"thin-2mm-{name}", name, controller.strip("`"))
+    return measures[column](run_of_sticks(name), name, controller.strip("`"))
+
+
+def run_of_sticks(detector: str) -> str:
+    """Return the latest run with sticks of 2 mm of a detector."""
+    latest = f"sticks-of-2mm/{detector}"
+    return latest if (RESULTS / latest).is_dir() else f"thin-2mm-{detector}"
+
+
+def oracle_lifts(rung: str, column: str) -> Any:
+    """Return a cell of the table of the oracle's rungs, by the folder that stands in it."""
+    folder, suite = RUNGS[rung.split("`")[1]]
+    (controller,) = {name for _, detector, name in cells(folder) if detector == "oracle"}
+    if column == "lifted %":
+        return success(folder, "oracle", controller, suite)
+    lines = cell(folder, "oracle", controller, suite).values()
+    assert column == "seen late"
+    return sum(line["first_detection_s"] != 0 for line in lines)
 
 
 def real_cell(error: str, column: str) -> Any:
