@@ -42,6 +42,19 @@ def test_a_thin_object_that_shows_only_from_near_by_is_found_by_all_but_publishe
     assert (found >= 3) == (name != "mvp")
 
 
+@pytest.mark.parametrize("name", ["mppc", "mppc_robust", "mvp_robust"])
+def test_what_is_claimed_late_is_grasped_however_many_views_claimed_nothing_before(name: str) -> None:
+    late = Blob(x=0.5, y=0.0, quality=lambda height: 0.6 if height < 0.2 else 0.0)
+    controller = make_controller(name)
+    for _ in range(60):
+        controller.update(observe((0.43, 0.0, 0.4), late))
+        assert controller.final_grasp() is None or name == "mppc"
+    controller.update(observe((0.43, 0.0, 0.19), late))
+    grasp = controller.final_grasp()
+    assert grasp is not None
+    assert np.hypot(*(grasp.position[:2] - [late.x, late.y])) < 0.01
+
+
 @pytest.mark.parametrize("name", REACHING)
 def test_with_nothing_told_apart_the_seed_chooses_the_direction_and_it_is_kept(name: str) -> None:
     headings = []
