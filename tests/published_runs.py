@@ -236,6 +236,19 @@ def oracle_lifts(rung: str, column: str) -> Any:
     return sum(line["first_detection_s"] != 0 for line in lines)
 
 
+def stacks(detector: str, controller: str, column: str) -> Any:
+    """Return a cell of the table of stacks that were played with today's controllers."""
+    name, how = NAMES[detector], controller.strip("`")
+    run = f"stacks/{NAMES[detector]}"
+    measures: dict[str, Callable[[], Any]] = {
+        "cleared": lambda: (sum(line["success"] for line in cell(run, name, how).values()), episodes_of(run)),
+        "time, s": lambda: mean_time(run, name, how),
+        "failed picks": lambda: failed_picks(run, name, how),
+        "stops": lambda: sum(len(line["stops"]) for line in cell(run, name, how).values()),
+    }
+    return measures[column]()
+
+
 def real_cell(error: str, column: str) -> Any:
     """Return a cell of the table of a real cell's errors: the rate of DHRNet with MP-PC in a suite."""
     return success(REAL_CELL + error.split("`")[1], "dhrnet", "mppc", column.removesuffix(" %"))
