@@ -81,9 +81,8 @@ class Sound:
     def update(self, observation):
         view = observation.grasp_map
         quality = np.nan_to_num(view.quality)
-        points = view.world_points()
         for failure in self.failures:
-            near = np.hypot(*(points - failure)[..., :2].transpose(2, 0, 1)) < 0.03
+            near = np.hypot(*(view.world_points() - failure)[..., :2].transpose(2, 0, 1)) < 0.03
             quality = np.where(near, 0, quality)
         row, col = best_pixel(quality)
         if quality[row, col] > 0.1:
@@ -372,5 +371,189 @@ for _ in range(3):
 }
 """Plug-ins that are refused when they are imported or made."""
 
-BAD_PLUG_INS: Mapping[str, BadPlugIn] = {**GUARDED, **LOADED}
+KIT: Mapping[str, BadPlugIn] = {
+    # detectors
+    "no-name": _detector("name: it has no name", "name = None", by="kit"),
+    "width-millimetres": _map(
+        "unit of the width: .*differ by more than a factor", "width=1000 * m.world_width()", by="kit"
+    ),
+    "width-half": _map("unit of the width: .*whole opening", "width=m.width / 2", by="kit"),
+    "width-of-the-whole-image": _map("unit of the width", "width=m.width * 4", by="kit"),
+    "angle-along": _map(
+        "direction of the angle: .*along the bar: add pi / 2", "angle=m.angle % np.pi - np.pi / 2", by="kit"
+    ),
+    "angle-clockwise": _map("direction of the angle: .*may be clockwise", "angle=-m.angle", by="kit"),
+    "angle-not-halved": _map(
+        "direction of the angle", "angle=(2 * m.angle + np.pi / 2) % np.pi - np.pi / 2", by="kit"
+    ),
+    "angle-in-the-world": _map(
+        "direction of the angle: .*in another frame",
+        "angle=wrap_half_pi(image_to_world_angle(m.angle, m.T_world_camera)).astype(np.float32)",
+        by="kit",
+        before="from mpgrasp.geometry import wrap_half_pi\nfrom mpgrasp.grasp import image_to_world_angle",
+    ),
+    "rows-for-columns": _map(
+        "place of the grasp: .*rows and columns", "quality=m.quality.T.copy()", by="kit"
+    ),
+    "upside-down": _map("place of the grasp", "quality=m.quality[::-1].copy()", by="kit"),
+    "intrinsics-not-scaled": _map(
+        "geometry of the map: only .*not those of its image",
+        "intrinsics=replace(m.intrinsics, fx=frame.intrinsics.fx, fy=frame.intrinsics.fy)",
+        by="kit",
+    ),
+    "intrinsics-not-cropped": _map(
+        "geometry of the map",
+        "intrinsics=replace(frame.intrinsics.resize(224, 224))",
+        by="kit",
+    ),
+    "sees-in-the-dark": _map(
+        "frame without returns: .*quality 0.5",
+        "quality=np.maximum(m.quality, 0.5), depth=np.nan_to_num(m.depth, nan=0.5)",
+        by="kit",
+    ),
+    "random": _map(
+        "same frame, same map: .*differs in", "quality=m.quality * np.random.uniform(0.9, 1)", by="kit"
+    ),
+    "keeps-frames": _detector(
+        "reset forgets: .*from episode to episode",
+        """
+        mean = None
+
+        def predict(self, frame):
+            m = super().predict(frame)
+            self.mean = m.quality if self.mean is None else 0.5 * (self.mean + m.quality)
+            return replace(m, quality=self.mean)
+        """,
+        by="kit",
+    ),
+    "tires": _detector(
+        "same frame, same map",
+        """
+        episodes = 0
+
+        def reset(self, truth):
+            self.episodes += 1
+
+        def predict(self, frame):
+            m = super().predict(frame)
+            return replace(m, quality=m.quality * 0.99**self.episodes)
+        """,
+        by="kit",
+    ),
+    "differs-from-its-like": _detector(
+        "a new one sees the same: .*--workers",
+        """
+        made = 0
+
+        def __init__(self):
+            Bad.made += 1
+            self.share = 0.9**Bad.made
+
+        def predict(self, frame):
+            m = super().predict(frame)
+            return replace(m, quality=m.quality * self.share)
+        """,
+        by="kit",
+    ),
+    "writes-into-the-frame": _detector(
+        "frame left as it is: .*writes into frame.depth",
+        """
+        def predict(self, frame):
+            m = super().predict(frame)
+            frame.depth[:10] = 0.4
+            return m
+        """,
+        by="kit",
+    ),
+    "takes-no-holes": _detector(
+        "frame with holes: it raises ValueError: NaN in the image",
+        """
+        def predict(self, frame):
+            if np.isnan(frame.depth).any():
+                raise ValueError("NaN in the image")
+            return super().predict(frame)
+        """,
+        by="kit",
+    ),
+    "exits-later": _detector(
+        "ends the program: sys.exit.3.", "def predict(self, frame): raise SystemExit(3)", by="kit"
+    ),
+    "hangs-later": _detector(
+        "the check .* takes longer than",
+        "def predict(self, frame): time.sleep(3600)",
+        by="kit",
+        before="import time",
+    ),
+    # controllers
+    "dice": _command(
+        "same seed, same reach: .*default_rng",
+        "twist=c.twist + 0.01 * np.random.standard_normal(6)",
+        by="kit",
+    ),
+    "never-forgets": _controller(
+        "reset forgets: .*final_grasp returns a grasp of the last|reset forgets: after another",
+        """
+        best, failures = None, ()
+
+        def reset(self, seed):
+            pass
+        """,
+        by="kit",
+    ),
+    "controllers-differ": _controller(
+        "a new one reaches alike: .*--workers",
+        """
+        made = 0
+
+        def __init__(self):
+            Bad.made += 1
+            self.speed = 0.001 * Bad.made
+
+        def update(self, observation):
+            c = super().update(observation)
+            return replace(c, twist=c.twist + [self.speed, 0, 0, 0, 0, 0])
+        """,
+        by="kit",
+    ),
+    "never-done": _command("comes to an end: .*timeout", "done=False, twist=0 * c.twist", by="kit"),
+    "into-the-table": _command(
+        "stays above the table: .*finger tips", "done=False, twist=np.array([0, 0, -0.05, 0, 0, 0])", by="kit"
+    ),
+    "too-fast": _command("within the robot's speeds: .*3.00 m/s", "twist=60 * c.twist", by="kit"),
+    "spins": _command(
+        "within the robot's speeds: .*3.00 rad/s", "twist=c.twist + np.array([0, 0, 0, 0, 0, 3.0])", by="kit"
+    ),
+    "angle-of-the-image": _controller(
+        "takes a lone peak: .*degrees off its direction",
+        """
+        def update(self, observation):
+            c, view = super().update(observation), observation.grasp_map
+            row, col = best_pixel(view.quality)
+            if view.quality[row, col] > 0.1:
+                self.best = replace(self.best, angle=float(view.angle[row, col]))
+            return c
+        """,
+        by="kit",
+    ),
+    "position-in-the-camera": _grasp(
+        "takes a lone peak: .*mm beside it", "position=g.position - [0.5, 0, 0]", by="kit"
+    ),
+    "opens-too-far": _grasp("takes a lone peak: .*opens 80 mm", "width=2 * g.width", by="kit"),
+    "never-grasps": _controller(
+        "takes a lone peak: .*returns None", "def final_grasp(self): return None", by="kit"
+    ),
+    "writes-into-the-view": _controller(
+        "view left as it is: update writes into the observation's quality",
+        """
+        def update(self, observation):
+            c = super().update(observation)
+            observation.grasp_map.quality[:20] = 1
+            return c
+        """,
+        by="kit",
+    ),
+}
+"""Plug-ins that return what could be, and are wrong all the same."""
+
+BAD_PLUG_INS: Mapping[str, BadPlugIn] = {**GUARDED, **LOADED, **KIT}
 """All of them, by name."""

@@ -25,7 +25,7 @@ ORDER = (
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
     "controllers", "guards", "motion", "recording", "episode",
-    "suite", "plugins", "settings", "env", "inspection",
+    "suite", "plugins", "settings", "env", "inspection", "check",
     "training.data", "training",
     "bench.record", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
     "bench.playing", "bench.commands", "bench",
@@ -206,7 +206,7 @@ def test_importing_the_environment_loads_no_torch() -> None:
     "words",
     [("bench", "--help"), ("bench", "compare", "--help"), ("bench", "replay", "--help"),
      ("bench", "report", "--help"), ("bench", "settings", "--help"),
-     ("detectors", "--help"), ("scene", "--help"),
+     ("detectors", "--help"), ("scene", "--help"), ("check", "--help"), ("check", "detector", "--help"),
      ("training", "--help"), ("training", "generate", "--help"), ("training", "train", "--help")],
 )  # fmt: skip
 def test_the_help_of_a_command_loads_nothing_heavy(words: tuple[str, ...]) -> None:
