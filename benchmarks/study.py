@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import os
 import shlex
 import sys
@@ -55,9 +56,10 @@ def run_command(study: Callable[[Sequence[str]], None], command: Sequence[str] |
 
 
 def positive(name: str, *values: float) -> None:
-    """Raise ConfigError unless all values are above 0."""
-    if min(values) <= 0:
-        raise ConfigError(f"unusable {name}", got=min(values), allowed="above 0")
+    """Raise ConfigError unless all values are finite and above 0."""
+    for value in values:
+        if not 0 < value < math.inf:
+            raise ConfigError(f"unusable {name}", got=value, allowed="above 0")
 
 
 def not_negative(name: str, value: int) -> None:

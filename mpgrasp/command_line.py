@@ -20,6 +20,8 @@ EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
 GL_BACKENDS = ("", "egl", "osmesa", "glfw", "glx", "wgl", "cgl", "enable", "enabled", "on", "true", "1",
                "disable", "disabled", "off", "false", "0")  # fmt: skip
 """What MuJoCo takes for MUJOCO_GL."""
+MOST_EPISODES = 100_000
+"""Most episodes of each combination: days of work for a hundred cores."""
 LARGEST = 2**63 - 1
 """Largest whole number of an option."""
 
@@ -72,9 +74,9 @@ def number(low: float, high: float, unit: str = "", *, above: bool = False) -> C
     return read
 
 
-COUNT = whole(1, 100_000)
-"""Type of an option that takes a number of episodes, scenes or the like: days of work for a hundred cores."""
-EPISODE = whole(0, 99_999)
+COUNT = whole(1, MOST_EPISODES)
+"""Type of an option that takes a number of episodes, scenes or the like."""
+EPISODE = whole(0, MOST_EPISODES - 1)
 """Type of an option that takes the number of an episode."""
 SEED = whole(0, LARGEST)
 """Type of an option that takes a seed."""

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from mpgrasp.command_line import MOST_EPISODES
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.files.regular import read_regular
@@ -45,6 +46,8 @@ METHOD_GROUPS = ("controller", "detector")
 GROUPS = ("scene", "episode", *EPISODE_GROUPS, *METHOD_GROUPS)
 """Groups of settings, each a table of a suite."""
 _LARGEST = 1.0  # MB of a declaration
+MOST_TURNS = 500
+"""Most scenes that a declaration may have."""
 _POINT = re.compile(r"(.+?)\[.+=.+\]")
 CALLERS = {"camera_backend": "the option --camera", "noise": "the option --no-noise"}
 """Settings of an episode that no suite decides, and what decides them."""
@@ -75,8 +78,9 @@ class Suite:
             raise ConfigError(f"{where} has no scene", allowed="one scene or more")
         if self.trial not in TRIALS:
             raise ConfigError(f"{where}: unknown trial", got=self.trial, allowed=TRIALS)
-        if self.trials < 1:
-            raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed="1 or more")
+        if not 1 <= self.trials <= MOST_EPISODES:
+            allowed = f"1 to {MOST_EPISODES}"
+            raise ConfigError(f"{where}: trials out of range", got=self.trials, allowed=allowed)
         if self.trial == "clear" and not all(scene.basket for scene in self.scenes):
             raise ConfigError(f"{where}: clearing needs a basket", got="basket = false", allowed="true")
         self._check_episode(self.episode, f"{where}, [episode]")
@@ -191,6 +195,8 @@ def parse_suite(name: str, declared: Mapping[str, Any]) -> Suite:
     found = from_table(_Declaration, declared, where)
     if not found.title:
         raise ConfigError(f"{where} has no title", got=found.title, allowed='title = "..."')
+    if len(found.turns) > MOST_TURNS:
+        raise ConfigError(f"{where} has too many turns", got=len(found.turns), allowed=f"up to {MOST_TURNS}")
     scenes = tuple(
         from_table(
             SceneConfig, _with_objects({**found.scene, **turn}, f"{where}, [scene]"), f"{where}, [scene]"

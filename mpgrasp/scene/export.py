@@ -12,6 +12,7 @@ import shutil
 from pathlib import Path
 
 from mpgrasp.exceptions import OutputError
+from mpgrasp.files.atomic import replace_file
 from mpgrasp.scene.scene import Scene
 
 
@@ -35,6 +36,8 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
     spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl)
     written = [path]
     try:
+        if path.is_dir():  # before its meshes are written beside it
+            raise IsADirectoryError(f"it is a directory: {path}")
         path.parent.mkdir(parents=True, exist_ok=True)
         xml = spec.to_xml()
         for source in sorted({Path(mesh.file) for mesh in spec.meshes if mesh.file}):
@@ -43,7 +46,7 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
             shutil.copyfile(source, target)
             xml = xml.replace(f'file="{source}"', f'file="{assets.name}/{target.name}"')
             written.append(target)
-        path.write_text(xml, encoding="utf-8")
+        replace_file(path, xml)
     except OSError as error:
         raise OutputError(
             "cannot write the scene", got=str(path), allowed=f"a writable file ({error})"

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpgrasp.command_line import COUNT, SEED, WORKERS, Parser, number, whole
+from mpgrasp.command_line import COUNT, MOST_EPISODES, SEED, WORKERS, Parser, number, whole
 from mpgrasp.exceptions import ConfigError
 
 _EPILOG = """\
@@ -137,7 +137,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--record",
         metavar="N",
-        type=whole(0, 100_000),
+        type=whole(0, MOST_EPISODES),
         default=0,
         help="record the first N episodes of each combination, for rerun, as GIF and as MP4 (default: 0)",
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Method, Task
 from mpgrasp.camera.backends import BACKENDS
+from mpgrasp.command_line import LARGEST, MOST_EPISODES
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.sharing import MethodSettings
@@ -70,11 +71,12 @@ class Plan:
     """Folder of what the report is drawn from; None keeps nothing."""
 
     def __post_init__(self) -> None:
-        for name, value, least in (
-            ("episodes", self.episodes, 1), ("seed", self.seed, 0), ("record", self.record, 0),
+        for name, value, least, most in (
+            ("episodes", self.episodes, 1, MOST_EPISODES), ("seed", self.seed, 0, LARGEST),
+            ("record", self.record, 0, MOST_EPISODES),
         ):  # fmt: skip
-            if value is not None and value < least:
-                raise ConfigError(f"{name} out of range", got=value, allowed=f"{least} or more")
+            if value is not None and not least <= value <= most:
+                raise ConfigError(f"{name} out of range", got=value, allowed=f"{least} to {most}")
         if self.until_ci is not None and not 0 < self.until_ci < 100:
             raise ConfigError(
                 "until-ci out of range", got=self.until_ci, allowed="percentage points between 0 and 100"

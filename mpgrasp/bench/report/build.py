@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,7 +89,10 @@ def write_report(folders: Sequence[Path], out: Path) -> Path:
     # loads Jinja, which the command's --help needs not
     from mpgrasp.bench.report.rendering import to_html, to_markdown
 
-    report = make_report(find_runs(folders))
+    runs = find_runs(folders)
+    with _writing(out / FILES[0]):  # or it would be known only once all is drawn
+        pass
+    report = make_report(runs)
     for name, text in zip(FILES, (to_html(report), to_markdown(report)), strict=True):
         _replace(out / name, text)
     return out / FILES[0]
@@ -147,9 +151,16 @@ def _not_drawn_text(runs: Runs) -> str:
 
 def _replace(file: Path, text: str) -> None:
     """Replace a file as a whole."""
+    with _writing(file):
+        replace_file(file, text)
+
+
+@contextmanager
+def _writing(file: Path) -> Iterator[None]:
+    """Make a file's folder, and have what goes wrong on the way to it be an error of output."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(file, text)
+        yield
     except OSError as error:
         raise OutputError(
             f"a report cannot be written ({error.strerror})",
