@@ -159,12 +159,15 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
             ConfigError: an action that is not four finite numbers, or another thread than that of `reset`.
             gymnasium.error.ResetNeeded: there is no episode, or it is over.
             PlugInError: what the detector returned cannot be used.
+            SimulationError: MuJoCo has warned.
         """
         self._check_thread()
         episode = self._episode
         if episode is None or self._over:
             raise gymnasium.error.ResetNeeded("there is no episode, or it is over: call reset() first")
-        episode.act(Command(twist=_twist(action), gripper=self.mppc.config.gripper_open), {})
+        command = Command(twist=_twist(action), gripper=self.mppc.config.gripper_open)
+        self._over = True  # unless the step goes well
+        episode.act(command, {})
         observed, info = self._look(episode)
         interrupted = episode.interruption() is not None
         self._over = interrupted or self._command.done

@@ -52,3 +52,7 @@ class OutputError(MpgraspError):
 
 class PlugInError(MpgraspError):
     """What a detector or a controller returned or did that cannot be used; it names the one at fault."""
+
+
+class SimulationError(MpgraspError):
+    """A simulation that the simulator itself has warned of, or broken off: there is no result."""

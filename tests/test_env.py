@@ -26,7 +26,7 @@ from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import run_episode
-from mpgrasp.exceptions import CameraError, ConfigError
+from mpgrasp.exceptions import CameraError, ConfigError, SimulationError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
 from mpgrasp.suite import Suite, episode_seed, load_suite, parse_suite
@@ -342,6 +342,19 @@ def test_stepping_needs_an_episode_that_runs(make: Make) -> None:
     env.close()
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.step(STILL)
+
+
+def test_what_the_simulator_warns_of_is_raised_and_takes_a_reset(make: Make) -> None:
+    env = make(Painter())
+    env.reset(seed=0)
+    assert env._episode is not None
+    env._episode.simulation.data.qpos[0] = np.nan
+    with pytest.raises(SimulationError, match=r"BADQPOS.*panda/joint1"):
+        env.step(STILL)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(STILL)
+    env.reset(seed=0)
+    assert not env.step(STILL)[2]
 
 
 def test_unusable_settings_are_refused_by_name() -> None:

@@ -117,24 +117,30 @@ class FreeHand(MovingScene):
 
     def touches(self) -> bool:
         """True if a part of the hand touches anything, where it is now."""
-        mujoco.mj_kinematics(self.model, self.data)
-        mujoco.mj_collision(self.model, self.data)
         self._stale = True
+        with self._watch:
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_collision(self.model, self.data)
         mine = self._is_hand[self.data.contact.geom]  # (ncon, 2)
         return bool((mine[:, 0] != mine[:, 1]).any())
 
     def step(self, target: FloatArray, n: int) -> None:
-        """Advance by n time steps, at the end of which the tool point should be at target (3,) [m]."""
+        """Advance by n time steps, at the end of which the tool point should be at target (3,) [m].
+
+        Raises:
+            SimulationError: MuJoCo has warned, now or since the last `reset`.
+        """
         way = target - self._target[:3]
         # the servo damps against standstill; its lead, damping / stiffness, makes it damp against the motion
         share = (np.arange(1 - n, 1) + _LEAD[:, None] / self._dt) / n  # (3, n)
         references = target + (way[:, None] * share).T
         force = np.zeros(3)
-        for k in range(n):
-            self._ctrl[:3] = references[k]
-            self._gripper.update()
-            mujoco.mj_step(self.model, self.data)
-            force += self._constraint
+        with self._watch:
+            for k in range(n):
+                self._ctrl[:3] = references[k]
+                self._gripper.update()
+                mujoco.mj_step(self.model, self.data)
+                force += self._constraint
         self._target[:3] = target
         self._force = force / n
         self._stale = True

@@ -12,6 +12,7 @@ from mpgrasp.robot import hand
 from mpgrasp.robot.contacts import FingerContacts
 from mpgrasp.robot.gripper import GripperDrive
 from mpgrasp.scene.scene import Scene
+from mpgrasp.scene.watch import Watch
 
 
 class MovingScene(ABC):
@@ -25,6 +26,7 @@ class MovingScene(ABC):
         self.scene = scene
         self.model: mujoco.MjModel = scene.model
         self.data = mujoco.MjData(self.model)
+        self._watch = Watch(self.model, self.data)
         self._gripper = GripperDrive(self.model, self.data)
         self._finger_contacts = FingerContacts(self.model, self.data, scene.objects)
         self._stale = False  # True while poses and contacts lag behind the joint positions
@@ -79,7 +81,12 @@ class MovingScene(ABC):
         return transform(body.xmat.reshape(3, 3), body.xpos)
 
     def refresh(self) -> None:
-        """Bring poses and contacts up to the joint positions, where they lag behind."""
+        """Bring poses and contacts up to the joint positions, where they lag behind.
+
+        Raises:
+            SimulationError: MuJoCo warns of the state.
+        """
         if self._stale:
-            mujoco.mj_forward(self.model, self.data)
+            with self._watch:
+                mujoco.mj_forward(self.model, self.data)
             self._stale = False

@@ -22,6 +22,7 @@ from mpgrasp.scene.objects.free_body import add_object
 from mpgrasp.scene.objects.model import OBJECT_GROUP, ObjectModel
 from mpgrasp.scene.settling import Settler
 from mpgrasp.scene.solver import set_in_motion
+from mpgrasp.scene.watch import forward
 from mpgrasp.workspace import WORKSPACE_CENTRE
 
 _WRINKLE_STREAM = 14  # of the seed, beside those of scene and episode
@@ -50,7 +51,7 @@ class Scene:
         """Fresh data in the settled state, kinematics computed."""
         data = mujoco.MjData(self.model)
         mujoco.mj_setState(self.model, data, self.state, STATE)
-        mujoco.mj_forward(self.model, data)
+        forward(self.model, data)
         return data
 
     def height_map(
@@ -106,6 +107,7 @@ def build_scene(config: SceneConfig, seed: int, *, robot: bool = True) -> Scene:
     Raises:
         ConfigError: a negative seed, an unknown object, or objects that cannot come to rest in the region.
         AssetError: an object or the robot whose files cannot be used.
+        SimulationError: MuJoCo has warned while the objects came to rest, as of too many contacts.
     """
     if seed < 0:
         raise ConfigError("unusable seed", got=seed, allowed="0 or above")
@@ -132,7 +134,7 @@ def build_scene(config: SceneConfig, seed: int, *, robot: bool = True) -> Scene:
     data = mujoco.MjData(compiled)
     if robot:
         set_home(compiled, data)
-    mujoco.mj_forward(compiled, data)
+    forward(compiled, data)
     state = np.empty(mujoco.mj_stateSize(compiled, STATE))
     mujoco.mj_getState(compiled, data, state, STATE)
     state.setflags(write=False)

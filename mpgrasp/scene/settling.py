@@ -19,6 +19,7 @@ from mpgrasp.linear_algebra import norm, product
 from mpgrasp.scene.cloth import Cloth
 from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.model import ObjectModel
+from mpgrasp.scene.watch import Watch
 
 REGION_TOLERANCE = 0.03
 """An object may roll this far out of the region's edge before it is dropped again [m]."""
@@ -57,6 +58,7 @@ class Settler:
 
     def __post_init__(self) -> None:
         self.data = mujoco.MjData(self.model)
+        self._watch = Watch(self.model, self.data)
         joints = [self.model.joint(f"{name}/free") for name in self.names]
         self._qpos = np.array([j.qposadr[0] for j in joints], int)
         self._dof = np.array([j.dofadr[0] for j in joints], int)
@@ -117,9 +119,10 @@ class Settler:
         self.data.qpos[height] += _LOWERING
 
     def _touches(self, k: int) -> bool:
-        mujoco.mj_kinematics(self.model, self.data)
-        mujoco.mj_comPos(self.model, self.data)
-        mujoco.mj_collision(self.model, self.data)
+        with self._watch:
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
+            mujoco.mj_collision(self.model, self.data)
         bodies = self.model.geom_bodyid[self.data.contact.geom]  # (ncon, 2)
         return bool((bodies == self._bodies[k]).any())
 
@@ -206,7 +209,8 @@ class Settler:
         calm = 0
         for _ in range(round(time / self.model.opt.timestep / _CHECK_STEPS)):
             self._park()  # falls a few centimetres between two checks
-            mujoco.mj_step(self.model, self.data, _CHECK_STEPS)
+            with self._watch:
+                mujoco.mj_step(self.model, self.data, _CHECK_STEPS)
             calm = calm + 1 if self._still()[self._dropped].all() else 0
             if calm >= _CALM_CHECKS:
                 return True

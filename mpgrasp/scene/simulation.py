@@ -52,15 +52,20 @@ class Simulation(MovingScene):
         self.set_q(panda.Q_HOME)
 
     def step(self, n: int = 1) -> None:
-        """Advance by n time steps."""
+        """Advance by n time steps.
+
+        Raises:
+            SimulationError: MuJoCo has warned, now or since the last `reset`.
+        """
         torque = np.zeros(7)
-        for _ in range(n):
-            self._drive_arm()
-            self._gripper.update()
-            mujoco.mj_step(self.model, self.data)
-            torque += self._arm_constraint
+        with self._watch:
+            for _ in range(n):
+                self._drive_arm()
+                self._gripper.update()
+                mujoco.mj_step(self.model, self.data)
+                torque += self._arm_constraint
+            mujoco.mj_forward(self.model, self.data)
         self._contact_torque = torque / max(n, 1)
-        mujoco.mj_forward(self.model, self.data)
 
     @property
     def q(self) -> FloatArray:
@@ -93,7 +98,8 @@ class Simulation(MovingScene):
         self._q_target: FloatArray = np.array(q, float)
         self._dq_target: FloatArray = np.zeros(7)
         self._ramp_steps = 0
-        mujoco.mj_forward(self.model, self.data)
+        with self._watch:
+            mujoco.mj_forward(self.model, self.data)
 
     def set_arm_target(self, q: FloatArray, dq: FloatArray) -> None:
         """Be at q (7,) [rad] one `SERVO_PERIOD` from now, moving with dq (7,) [rad/s].

@@ -22,7 +22,7 @@ from mpgrasp.bench.results.provenance import sha256
 from mpgrasp.bench.results.run_card import MeshCard
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
 from mpgrasp.detectors.antipodal.hand import HandGeometry
-from mpgrasp.exceptions import AssetError, ConfigError
+from mpgrasp.exceptions import AssetError, ConfigError, SimulationError
 from mpgrasp.files.cache import load_result, store_result
 from mpgrasp.files.json_values import json_value
 from mpgrasp.scene.config import SceneConfig
@@ -36,6 +36,8 @@ SOME_GRASP = 0.1
 """Quality of the best grasp above which the hand can close on an object: no controller attempts less."""
 SURE_GRASP = 0.5
 """The same where every pose must offer one."""
+MAX_CONTACTS = 200
+"""Most contacts of an object at rest; MuJoCo has memory for some 480, and a hand is yet to come."""
 
 
 class _CachedPoses(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -90,7 +92,7 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> MeshVerdict
         body = read_body(file.path)
         model = body.as_object(file.name, density=density, provenance=f"mesh file {file.path.name}")
         qualities = _best_grasps(model, scene, _poses_key(body.key, scene, density))
-    except (AssetError, ConfigError) as error:
+    except (AssetError, ConfigError, SimulationError) as error:
         return replace(verdict, reason=str(error))
     except ValueError as error:  # how MuJoCo's compiler complains
         return replace(verdict, reason=f"MuJoCo cannot use it ({' '.join(str(error).split())})")
@@ -130,7 +132,10 @@ def _best_grasp(config: SceneConfig, seed: int) -> float | None:
         settled = build_scene(config, seed, robot=False)
     except ConfigError:  # it rolls, slides or rocks on
         return None
-    return float(antipodal_grasps(settled.height_map()).quality.max())
+    data = settled.data()
+    if data.ncon > MAX_CONTACTS:
+        raise AssetError("too many contacts at rest", got=data.ncon, allowed=f"up to {MAX_CONTACTS}")
+    return float(antipodal_grasps(settled.height_map(data=data)).quality.max())
 
 
 def _poses_key(mesh: str, scene: SceneConfig, density: float) -> str:

@@ -131,6 +131,7 @@ def _draw(simulation: Simulation, postures: Iterable[_Posture], camera: str) -> 
 
     from mpgrasp.recording.false_colour import shade
     from mpgrasp.recording.watcher import Watcher
+    from mpgrasp.scene.watch import forward
 
     data = mujoco.MjData(simulation.model)
     watcher = Watcher(simulation.model, camera)
@@ -138,7 +139,7 @@ def _draw(simulation: Simulation, postures: Iterable[_Posture], camera: str) -> 
     try:
         for posture in postures:
             data.qpos[:] = posture.qpos
-            mujoco.mj_forward(simulation.model, data)
+            forward(simulation.model, data)
             image = Image.fromarray(watcher.picture(data, _VIEWPOINT))
             if posture.quality is not None:
                 inset = Image.fromarray(shade(posture.quality.astype(float), 0.0, 1.0))

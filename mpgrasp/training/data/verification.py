@@ -9,12 +9,14 @@ analysis ranks grasps better than one lift can. An audit then lifts grasps drawn
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps, quality_along
+from mpgrasp.exceptions import SimulationError
 from mpgrasp.geometry import FloatArray, line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.height_map import HeightMap
@@ -89,7 +91,8 @@ def verify(
         grasps: its analysis.
         rng: draws the grasps.
         index: of the scene, for the record.
-        lift: tries a grasp; a `LiftRig` of the scene by default.
+        lift: tries a grasp; a `LiftRig` of the scene by default. One that raises `SimulationError` has shown
+            nothing: the trial is left out.
     """
     if lift is None:
         rig = LiftRig(scene)
@@ -98,18 +101,22 @@ def verify(
             return Outcome(rig.attempt(grasp).outcome)
 
     truth = grasps.height_map
-    trials = []
+    trials: list[_Trial] = []
     for row, col in draw_positives(grasps, rng):
         grasp = _grasp_at(grasps, row, col)
-        trials.append(_Trial(row=row, col=col, grasp=grasp, positive=True, outcome=lift(grasp)))
+        with suppress(SimulationError):
+            trials.append(_Trial(row=row, col=col, grasp=grasp, positive=True, outcome=lift(grasp)))
     for row, col, angle in draw_negatives(truth, rng):
         grasp = Grasp(position=_point(truth, row, col), angle=angle, width=WIDE_OPEN, quality=0.0)
-        trials.append(_Trial(row=row, col=col, grasp=grasp, positive=False, outcome=lift(grasp)))
+        with suppress(SimulationError):
+            trials.append(_Trial(row=row, col=col, grasp=grasp, positive=False, outcome=lift(grasp)))
     shipped = corrected(grasps, [t for t in trials if t.positive])
-    audits = []
+    audits: list[_Trial] = []
     for row, col in draw_audits(shipped, {(t.row, t.col) for t in trials}, rng):
         grasp = _grasp_at(grasps, row, col)
-        audits.append(_Trial(row=row, col=col, grasp=grasp, positive=True, audit=True, outcome=lift(grasp)))
+        with suppress(SimulationError):
+            outcome = lift(grasp)
+            audits.append(_Trial(row=row, col=col, grasp=grasp, positive=True, audit=True, outcome=outcome))
     height = _object_heights(truth)
     record = [
         (

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import cv2
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,7 +12,7 @@ from mpgrasp.camera.config import D435_INTRINSICS
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import CROP, NETWORK_SIZE, CameraIntrinsics, crop_resize
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import ConfigError, SimulationError
 from mpgrasp.geometry import FloatArray, looking_down, rotation_x, rotation_z, transform
 from mpgrasp.height_map import HeightMap
 from mpgrasp.scene.scene import Scene, build_scene
@@ -54,7 +53,7 @@ def make_scene(seed: int, index: int) -> tuple[Scene, np.random.Generator]:
         scene_config, scene_seed = training_scene_config(rng), int(rng.integers(2**31))
         try:
             scene = build_scene(scene_config, scene_seed, robot=False)
-        except (ConfigError, mujoco.FatalError):
+        except (ConfigError, SimulationError):
             continue  # found no rest in their region, or more contacts than memory for them: draw others
         randomise_appearance(scene, np.random.default_rng([seed, index, _LOOK]))
         return scene, rng

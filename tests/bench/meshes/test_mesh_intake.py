@@ -16,8 +16,11 @@ from toy_meshes import box, open_box, u_shape, write
 from mpgrasp.bench.__main__ import main
 from mpgrasp.bench.commands.run import make_parser
 from mpgrasp.bench.meshes import check, intake
-from mpgrasp.bench.meshes.files import find_objects
+from mpgrasp.bench.meshes.check import examine
+from mpgrasp.bench.meshes.files import ObjectFile, find_objects
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.scene import scene
+from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.objects.from_mesh import DENSITY
 from mpgrasp.suite import load_suite
 
@@ -172,3 +175,53 @@ def test_mesh_on_which_a_library_crashes_is_reported(tmp_path: Path, monkeypatch
         intake.take_objects(
             load_suite("single"), [str(box(tmp_path / "box.stl"))], density=DENSITY, workers=1, quiet=True
         )
+
+
+def blocks(path: Path, count: int) -> ObjectFile:
+    """A plate of blocks of 6 mm, half a millimetre apart."""
+    edge, step = 0.006, 0.0065
+    cubes = [trimesh.creation.box((edge,) * 3) for _ in range(count)]
+    for k, cube in enumerate(cubes):
+        cube.apply_translation((step * (k % 20), step * (k // 20), 0))
+    return ObjectFile(name="blocks", path=write(trimesh.util.concatenate(cubes), path))
+
+
+FLAT = SceneConfig(objects=("usb_stick",), cloth_unevenness=0.0)
+
+
+def test_a_mesh_of_four_hundred_bodies_is_refused(tmp_path: Path) -> None:
+    verdict = examine(blocks(tmp_path / "blocks.stl", 400), FLAT, DENSITY)
+    assert not verdict.accepted
+    assert verdict.reason == "mesh is of many bodies; got 400; allowed: up to 32"
+
+
+def test_a_mesh_with_too_many_contacts_at_rest_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = blocks(tmp_path / "blocks.stl", 9)
+    monkeypatch.setattr(check, "MAX_CONTACTS", 36)  # nine blocks stand on four corners each
+    assert "contacts" not in (examine(file, FLAT, DENSITY).reason or "")
+    monkeypatch.setenv("MPGRASP_CACHE", str(tmp_path / "another"))
+    monkeypatch.setattr(check, "MAX_CONTACTS", 35)
+    assert examine(file, FLAT, DENSITY).reason == "too many contacts at rest; got 36; allowed: up to 35"
+
+
+def test_a_mesh_that_the_simulator_warns_of_is_refused_with_its_words_and_leaves_no_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arena = scene._arena
+
+    def small(*arguments: Any) -> Any:
+        spec = arena(*arguments)
+        spec.memory = 100_000
+        return spec
+
+    file = blocks(tmp_path / "blocks.stl", 9)
+    monkeypatch.setattr(scene, "_arena", small)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    verdict = examine(file, FLAT, DENSITY)
+    assert not verdict.accepted
+    assert "the simulator warned" in (verdict.reason or "")
+    assert "Insufficient arena memory" in (verdict.reason or "")
+    assert not list((tmp_path / "here").iterdir())

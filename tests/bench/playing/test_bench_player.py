@@ -5,15 +5,18 @@ from pathlib import Path
 from typing import Any
 
 import fakes
+import numpy as np
 import pytest
 from bench_plans import CONTROLLER, lines_of, make_plan, without_timing
 from full_disk import room_for
 from toy_recordings import shown
 
+from mpgrasp.bench.analysis.summary import summarise
 from mpgrasp.bench.playing.crew import make_crew
-from mpgrasp.bench.playing.player import Player
-from mpgrasp.bench.record import Line
+from mpgrasp.bench.playing.player import Player, real_games
+from mpgrasp.bench.record import ErrorLine, Line
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.scene.simulation import Simulation
 
 
 class Compiled(fakes.FakeDetector):
@@ -89,3 +92,32 @@ def test_a_trace_that_cannot_be_written_takes_nothing_from_its_episode(tmp_path:
     assert without_timing([line]) == without_timing(lines_of(make_plan(episodes=1)))
     assert len(one.lost) == 1
     assert "a trace cannot be written" in one.lost[0]
+
+
+@pytest.mark.parametrize(
+    ("array", "value", "said"),
+    [
+        ("qpos", np.nan, "BADQPOS.*panda/joint7"),
+        ("qvel", 1e12, "BADQVEL.*panda/joint7"),
+        ("qfrc_applied", 1e30, "BADQACC"),
+    ],
+)
+def test_what_the_simulator_warns_of_is_an_error_row_and_no_failure_of_the_method(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, array: str, value: float, said: str
+) -> None:
+    step = Simulation.step
+
+    def spoilt(simulation: Simulation, n: int = 1) -> None:
+        if simulation.time > 0.5:
+            getattr(simulation.data.joint("panda/joint7"), array)[0] = value
+        step(simulation, n)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Simulation, "step", spoilt)
+    plan = make_plan(detectors=("oracle",), controllers=("mppc",), episodes=1, camera="ray")
+    (line,) = lines_of(plan, real_games())
+    assert isinstance(line, ErrorLine)
+    assert re.search(rf"SimulationError: the simulator warned; got '.*{said}", line.error)
+    (cell,) = summarise([line])
+    assert (cell.n, cell.errors, cell.successes, cell.failures) == (0, 1, 0, {})
+    assert not list(tmp_path.iterdir())

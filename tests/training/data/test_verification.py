@@ -7,6 +7,7 @@ import pytest
 from height_maps import Solid, height_map
 
 from mpgrasp.detectors.antipodal.analysis import WorldGrasps, antipodal_grasps
+from mpgrasp.exceptions import SimulationError
 from mpgrasp.geometry import line_angle_difference
 from mpgrasp.grasp import Grasp
 from mpgrasp.outcome import Outcome
@@ -164,3 +165,12 @@ def test_the_table_counts_by_thickness_and_kind() -> None:
     assert first["analytic positives, any quality"] == ["1/2", "1/1", "0/1"]
     assert first["analytic negatives"] == ["1/1", "none", "1/1"]
     assert first[f"shipped positives ({GOOD} or better)"] == ["1/1", "none", "1/1"]
+
+
+def test_a_lift_that_the_simulator_breaks_off_is_no_trial_and_teaches_nothing(grasps: WorldGrasps) -> None:
+    def broken(_: Grasp) -> Outcome:
+        raise SimulationError("the simulator warned")
+
+    verified = verify(None, grasps, np.random.default_rng(0), index=7, lift=broken)  # type: ignore[arg-type]
+    assert verified.trials.shape == (0, len(TRIAL_COLUMNS))
+    assert np.array_equal(verified.grasps.quality, grasps.quality)
