@@ -182,7 +182,7 @@ def test_an_interrupted_study_goes_on_and_more_worlds_are_added(
         (["--workers", "0"], "workers"),
         (["--thickness", "thin"], "unusable thickness"),
         (["--thickness", "-2"], "unusable thickness"),
-        (["--seed", "-1"], "negative seed"),
+        (["--seed", "-1"], "--seed: unusable number; got '-1'"),
         (["--detector", "resnet"], "unknown detector"),
     ],
 )

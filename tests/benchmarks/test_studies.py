@@ -402,17 +402,17 @@ def test_every_network_is_timed_once_a_round_on_every_runtime(monkeypatch: pytes
     [
         ("ablation", [], "study"),
         ("ablation", ["colours"], "invalid choice"),
-        ("ablation", ["fusion", "--images", "0"], "size of an ablation"),
+        ("ablation", ["fusion", "--images", "0"], "--images: unusable number"),
         ("ablation", ["fusion", "--seeds", "0"], "seeds"),
         ("ablation", ["architecture", "--data", "/nowhere"], "not enough images"),
         ("ablation", ["architecture", "--out", "/dev/null/x"], "cannot be written"),
         ("held_out", ["--detector", "resnet"], "unknown detector"),
         ("held_out", ["--detector", "oracle", "--data", "/nowhere"], "no training images"),
         ("held_out", ["--workers", "0"], "workers"),
-        ("held_out", ["--seed", "-1"], "negative seed"),
+        ("held_out", ["--seed", "-1"], "--seed: unusable number; got '-1'"),
         ("run_time", ["--network", "resnet"], "unknown network"),
         ("run_time", ["--rounds", "0"], "rounds"),
-        ("run_time", ["--seed", "-1"], "negative seed"),
+        ("run_time", ["--seed", "-1"], "--seed: unusable number; got '-1'"),
     ],
 )
 def test_unusable_input_is_one_line_and_exit_code_2(

@@ -181,9 +181,9 @@ def test_the_same_seed_gives_the_same_file_and_a_picture(
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (["--scenes", "0"], "number of scenes"),
-        (["--scenes", "few"], "invalid int"),
-        (["--seed", "-1"], "negative seed"),
+        (["--scenes", "0"], "--scenes: unusable number; got '0'"),
+        (["--scenes", "few"], "--scenes: unusable number; got 'few'"),
+        (["--seed", "-1"], "--seed: unusable number; got '-1'"),
         (["--camera", "film"], "invalid choice"),
         (["--detector", "resnet"], "unknown detector"),
         (["--detector", "dhrnet,"], "unknown detector; got ''"),

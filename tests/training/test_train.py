@@ -13,6 +13,7 @@ import pytest
 import torch
 from toy_training import SMALL
 
+from mpgrasp.command_line import Parser
 from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.training import trainer as trainer_module
@@ -23,6 +24,9 @@ from mpgrasp.training.train import add_arguments, command_line, config_from
 @pytest.fixture(autouse=True)
 def _one_thread() -> None:
     torch.set_num_threads(1)
+
+
+WHOLE = ("batch", "images", "seed", "validation-images", "lift-images")
 
 
 @pytest.mark.parametrize(
@@ -37,11 +41,15 @@ def _one_thread() -> None:
     ],
 )
 def test_an_unusable_number_is_one_error_that_names_it_alone(option: str, values: str) -> None:
-    parser = argparse.ArgumentParser()
+    parser = Parser(prog="train")
     add_arguments(parser)
     name = option.replace("-", "_")
     for value in values.split():
-        args = parser.parse_args(["dhrnet", "--data", "d", f"--{option}", value])
+        with pytest.raises(ConfigError, match=f"--{option}: unusable number|unusable {name}"):
+            config_from(parser.parse_args(["dhrnet", "--data", "d", f"--{option}", value]))
+        # nor does the config itself take what a program gives it
+        args = parser.parse_args(["dhrnet", "--data", "d"])
+        setattr(args, name, int(value) if option in WHOLE else float(value))
         with pytest.raises(ConfigError) as caught:
             config_from(args)
         wrong, got, allowed = str(caught.value).split("; ")
