@@ -58,7 +58,7 @@ def test_a_replay_names_a_configuration_that_has_changed(
     [
         (["--episode", "0"], "the run has several cells"),
         (["--episode", "9", *CELL], "the run has no episode 9"),
-        (["--episode", "-1", *CELL], "episode out of range"),
+        (["--episode", "-1", *CELL], "--episode: unusable number; got '-1'"),
         (["--episode", "0", "--cell", "oracle/mppc"], "no such cell; got 'oracle/mppc'"),
         (CELL, "required: --episode"),
     ],
