@@ -378,6 +378,7 @@ KIT: Mapping[str, BadPlugIn] = {
         "unit of the width: .*differ by more than a factor", "width=1000 * m.world_width()", by="kit"
     ),
     "width-half": _map("unit of the width: .*whole opening", "width=m.width / 2", by="kit"),
+    "blind": _map("sees a plain box: .*leads the robot nowhere", "quality=0 * m.quality", by="kit"),
     "width-of-the-whole-image": _map("unit of the width", "width=m.width * 4", by="kit"),
     "angle-along": _map(
         "direction of the angle: .*along the bar: add pi / 2", "angle=m.angle % np.pi - np.pi / 2", by="kit"

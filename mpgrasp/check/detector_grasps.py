@@ -15,6 +15,8 @@ ANGLE = np.deg2rad(30)
 OPENINGS = (0.8, 3.5)
 """Opening over the breadth of the bar. With less, a finger comes down on it, a network's error left aside;
 this hand, fully open, has 2.7."""
+AMPLE = 2.2
+"""Opening over the breadth of the bar beyond which it is worth a look; those that ship ask for less."""
 SPREAD = 1.6
 """Most that the openings of one bar, each the median under `YAWS`, may differ by between heights, as a ratio.
 Openings in millimetres, or in pixels of one height for all, differ by 1.96 there; those of the networks that
@@ -55,11 +57,26 @@ def _beside(grasp: Grasp, box: Box) -> float:
     return float(np.linalg.norm(np.maximum(beyond, 0.0)))
 
 
-def _width(subject: DetectorSubject) -> str:
-    openings = [
+def _openings(subject: DetectorSubject) -> list[float]:
+    """Return the openings for the bar at each height, each the median under `YAWS` [m]."""
+    return [
         float(np.median([subject.best(BAR, height=height, yaw=yaw).width for yaw in YAWS]))
         for height in HEIGHTS
     ]
+
+
+def _ample(subject: DetectorSubject) -> str:
+    widest, breadth = max(_openings(subject)), BAR.breadth
+    if widest > AMPLE * breadth:
+        raise Broken(
+            f"a bar {1e3 * breadth:.0f} mm broad is to be grasped with an opening of {1e3 * widest:.0f} mm: "
+            f"is it counted twice? A hand that opens this far needs room, and hits what stands beside"
+        )
+    return f"a bar {1e3 * breadth:.0f} mm broad needs no opening above {1e3 * widest:.0f} mm"
+
+
+def _width(subject: DetectorSubject) -> str:
+    openings = _openings(subject)
     words = ", ".join(f"{1e3 * opening:.0f}" for opening in openings)
     low, high = (share * BAR.breadth for share in OPENINGS)
     if not low <= min(openings) <= max(openings) <= high:
@@ -116,10 +133,11 @@ def _mirror(subject: DetectorSubject) -> str:
 
 
 LAWS: tuple[Law[DetectorSubject], ...] = (
-    Law(name="sees a plain box", must=False, check=_sees),
+    Law(name="sees a plain box", check=_sees),
     Law(name="place of the grasp", check=_place),
     Law(name="unit of the width", check=_width),
     Law(name="direction of the angle", check=_angle),
+    Law(name="opening no wider than needed", must=False, check=_ample),
     Law(name="mirror symmetry", must=False, check=_mirror),
 )
 """In the order in which they are tried."""
