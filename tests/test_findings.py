@@ -159,7 +159,7 @@ def test_docs_list_all_runs_of_modified_checkouts() -> None:
 
 
 def test_every_result_folder_is_named() -> None:
-    named = set(re.findall(r"benchmarks/results/([\w/-]+)", TEXTS["docs/results.md"]))
+    named = set(re.findall(r"benchmarks/results/([\w/.-]*\w)", TEXTS["docs/results.md"]))
     published = {
         path.parent.relative_to(table.RESULTS).as_posix() for path in table.RESULTS.rglob("run.json")
     }
