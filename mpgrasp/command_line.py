@@ -14,12 +14,11 @@ from typing import Any, NoReturn
 from mpgrasp.exceptions import ConfigError, MpgraspError
 from mpgrasp.names import printable
 
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
-
+EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 2, 130, 141
 
 GL_BACKENDS = ("", "egl", "osmesa", "glfw", "glx", "wgl", "cgl", "enable", "enabled", "on", "true", "1",
                "disable", "disabled", "off", "false", "0")  # fmt: skip
-"""What MuJoCo takes for MUJOCO_GL."""
+"""Values of MUJOCO_GL that MuJoCo takes."""
 MOST_EPISODES = 100_000
 """Most episodes of each combination: days of work for a hundred cores."""
 LARGEST = 2**63 - 1
@@ -96,7 +95,7 @@ def run_command(command: Callable[[], int]) -> int:
     """Run a command and return its exit code: its own, 2 and one line for unusable input, 130 for Ctrl-C.
 
     What the system refuses, such as a name that is too long or a full disk under standard output, is unusable
-    input too.
+    input too. A pipe that nobody reads any more ends it silently, with 141.
     """
     try:
         check_gl()
@@ -105,6 +104,9 @@ def run_command(command: Callable[[], int]) -> int:
     except MpgraspError as error:
         print_error(error)
         return EXIT_BAD_INPUT
+    except BrokenPipeError:  # whoever reads our output, such as `head`, has had enough
+        _give_up_stdout()
+        return EXIT_PIPE
     except OSError as error:
         _give_up_stdout()
         where = "" if error.filename is None else f"; got {error.filename!r}"

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import io
-import threading
-import time
 from contextlib import redirect_stdout
+from functools import partial
+from itertools import islice
 
 import numpy as np
 
 from mpgrasp.check.controller_subject import FAR, NEAR, ControllerSubject
 from mpgrasp.check.flight import T_TCP_CAMERA, Flight, fly, observations, view_of
 from mpgrasp.check.laws import Broken, Law
-from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.check.running import same_in_a_thread, time_of
 from mpgrasp.guards.asking import ask_final_grasp
 from mpgrasp.linear_algebra import product
 
@@ -105,45 +105,14 @@ def _silent(subject: ControllerSubject) -> str:
 
 
 def _thread(subject: ControllerSubject) -> str:
-    here = subject.over_peak
-    there: list[Flight | BaseException] = []
-
-    def reach() -> None:
-        try:
-            there.append(fly(subject.controller, NEAR))
-        except BaseException as error:
-            there.append(error)
-
-    thread = threading.Thread(target=reach, daemon=True)
-    thread.start()
-    thread.join(60)
-    if not there or isinstance(there[0], BaseException):
-        found: str | None = f"it raises {there[0]!r}" if there else "it hangs"
-    else:
-        found = _different(here, there[0])
-    if found:
-        raise Broken(
-            f"in another thread than the one that made it: {found}; environments on threads need that"
-        )
+    same_in_a_thread(lambda: fly(subject.controller, NEAR), _different)
     return "another thread sees the same reach"
 
 
 def _latency(subject: ControllerSubject) -> str:
-    seconds, clock = [], time.perf_counter()
     subject.controller.reset(0)
-    for seen, _ in observations(subject.controller, [NEAR]):
-        clock = time.perf_counter()
-        subject.controller.update(seen)
-        seconds.append(time.perf_counter() - clock)
-        if len(seconds) == _LOOKS:
-            break
-    median, tick = float(np.median(seconds)), EpisodeConfig().control_dt
-    if median > tick:
-        raise Broken(
-            f"an update takes {1e3 * median:.0f} ms, longer than a control tick of {1e3 * tick:.0f}: "
-            f"simulated time waits for it, a robot would not"
-        )
-    return f"an update takes {1e3 * median:.1f} ms of a control tick of {1e3 * tick:.0f}"
+    ticks = islice(observations(subject.controller, [NEAR]), _LOOKS)
+    return time_of((partial(subject.controller.update, seen) for seen, _ in ticks), "an update")
 
 
 FIRST: tuple[Law[ControllerSubject], ...] = (Law(name="name", check=_name),)

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import threading
-import time
-
-import numpy as np
-
 from mpgrasp.check.detector_subject import BAR, BOX, HEIGHTS, DetectorSubject, different
 from mpgrasp.check.laws import Broken, Law
+from mpgrasp.check.running import same_in_a_thread, time_of
 from mpgrasp.detectors.detector import prepare
-from mpgrasp.episode.config import EpisodeConfig
-from mpgrasp.grasp import GraspMap
 from mpgrasp.guards.asking import ask_detector
 
 _REPEATS = 5
@@ -56,44 +50,14 @@ def _fresh(subject: DetectorSubject) -> str:
 
 
 def _thread(subject: DetectorSubject) -> str:
-    here = subject.look(BOX)
-    there: list[GraspMap | BaseException] = []
-
-    def look() -> None:
-        try:
-            there.append(subject.look(BOX))
-        except BaseException as error:
-            there.append(error)
-
-    thread = threading.Thread(target=look, daemon=True)
-    thread.start()
-    thread.join(60)
-    if not there or isinstance(there[0], BaseException):
-        found: str | None = f"it raises {there[0]!r}" if there else "it hangs"
-    else:
-        found = different(here, there[0])
-    if found:
-        raise Broken(
-            f"in another thread than the one that made it: {found}; environments on threads need that"
-        )
+    same_in_a_thread(lambda: subject.look(BOX), different)
     return "another thread sees the same"
 
 
 def _latency(subject: DetectorSubject) -> str:
     image = subject.frame(BOX)
     subject.reset(BOX)
-    seconds = []
-    for _ in range(_REPEATS):
-        clock = time.perf_counter()
-        subject.detector.predict(image)
-        seconds.append(time.perf_counter() - clock)
-    median, tick = float(np.median(seconds)), EpisodeConfig().control_dt
-    if median > tick:
-        raise Broken(
-            f"a frame takes {1e3 * median:.0f} ms, longer than a control tick of {1e3 * tick:.0f}: simulated "
-            f"time waits for it, a robot would not"
-        )
-    return f"a frame takes {1e3 * median:.1f} ms of a control tick of {1e3 * tick:.0f}"
+    return time_of([lambda: subject.detector.predict(image)] * _REPEATS, "a frame")
 
 
 LAWS: tuple[Law[DetectorSubject], ...] = (

@@ -68,7 +68,7 @@ def share_of_union(solids: Sequence[Solid]) -> float:
 
     It is counted at points that fill the box around them evenly (a Sobol sequence), to about 1 %.
     """
-    if len(solids) < 2 or min(gaps(solids).values()) > 0:
+    if len(solids) < 2:
         return 1.0
     from scipy.stats import qmc
 

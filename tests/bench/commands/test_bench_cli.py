@@ -170,6 +170,18 @@ def test_a_table_that_standard_output_does_not_take_is_one_line_and_results_are_
     assert done.stderr == "mpgrasp: error: the system refused: No space left on device\n"
 
 
+def test_a_reader_that_has_had_enough_ends_a_command_silently() -> None:
+    command = subprocess.Popen(
+        [sys.executable, "-m", "mpgrasp.bench", "settings", "stacked"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert command.stdout is not None
+    command.stdout.close()  # before anything is written
+    assert command.stderr is not None
+    assert command.stderr.read() == b""
+    assert command.wait(60) == 141
+
+
 @pytest.fixture
 def catalogue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An object catalogue of one's own, to be written into."""
