@@ -229,6 +229,8 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("picture --out ''", _PATH),
     ("picture --out file/episode.png", _TAKEN),
     ("run_time --network resnet", "unknown network; got 'resnet'"),
+    ("same_bits thick", "unknown suite; got 'thick'"),
+    ("same_bits --controller pid", "unknown controller; got 'pid'"),
     ("table --bogus", "unrecognized arguments: --bogus"),
     ("thickness --camera eye", "invalid choice: 'eye'"),
     ("thickness --detector oracle --out file", _TAKEN),

@@ -40,6 +40,7 @@ BAD_NUMBERS: tuple[tuple[str, str, tuple[str, ...], str], ...] = (
     ("controller_factors", "--workers", ("-1",), "1 to 256"),
     ("held_out", "--workers", ("0",), "1 to 256"),
     ("run_time", "--rounds", ("0", _HUGE), "1 to 100000"),
+    ("same_bits", "--episodes", ("0",), "1 to 100000"),
     ("singular_film", "--episode", ("-1",), "0 to 99999"),
     ("stages", "--ticks", ("0", "few"), "1 to 100000"),
     ("thickness", "--scenes", _COUNT, "1 to 100000"),

@@ -22,7 +22,9 @@ from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.grasp import Grasp, GraspMap
 from mpgrasp.height_map import HeightMap
 
-NAMES = ("ablation", "controller_factors", "held_out", "run_time", "singular_film", "thickness")
+NAMES = (
+    "ablation", "controller_factors", "held_out", "run_time", "same_bits", "singular_film", "thickness",
+)  # fmt: skip
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 TINY = {"width": 8, "stem_width": 8, "head_width": 8, "blocks": 1, "fine_head": False}
 
