@@ -6,11 +6,20 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from mpgrasp.processes import born_deaf, end_by_interrupts, ignore_interrupts, interrupts_wait
+
+
+@pytest.fixture(autouse=True)
+def hears_interrupts() -> Iterator[None]:
+    """Who runs the tests in the background has them ignore Ctrl-C, and so would their processes."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
 
 SPAWN = multiprocessing.get_context("spawn")
 

@@ -61,7 +61,7 @@ def test_ways_are_drawn_with_the_stick_and_where_the_value_is_smallest() -> None
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (["--episode", "-1"], "negative episode"),
+        (["--episode", "-1"], "argument --episode: unusable number"),
         (["--detector", "resnet"], "unknown detector"),
         (["--out", "film.gif"], "a stem with an ending"),
     ],

@@ -338,7 +338,7 @@ def test_the_check_command_tells_how_many_frames_agree(
     [
         (["check", "oracle"], "a detector without a runtime; got 'oracle'"),
         (["check", "dhrnet", "--runtime", "tpu"], "unknown runtime; got 'tpu'"),
-        (["check", "dhrnet", "--frames", "0"], "number of frames"),
+        (["check", "dhrnet", "--frames", "0"], "argument --frames: unusable number; got '0'"),
         (["show", "dhrnet", "--runtime", "tpu"], "unknown runtime; got 'tpu'"),
     ],
 )
