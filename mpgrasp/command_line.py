@@ -9,10 +9,13 @@ import sys
 from collections.abc import Callable
 from ctypes.util import find_library
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from mpgrasp.exceptions import ConfigError, MpgraspError
 from mpgrasp.names import printable
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 2, 130, 141
 
@@ -39,6 +42,10 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise ConfigError(message, allowed=None if "; allowed: " in message else f"see {self.prog} --help")
+
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        """Print the help; OSError where it cannot be written, which argparse would keep to itself."""
+        (file or sys.stdout).write(self.format_help())
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
@@ -99,16 +106,20 @@ def run_command(command: Callable[[], int]) -> int:
     """
     try:
         check_gl()
-        code = command()
+        try:
+            code = command()
+        except SystemExit:  # after `--help`
+            sys.stdout.flush()
+            raise
         sys.stdout.flush()
     except MpgraspError as error:
         print_error(error)
         return EXIT_BAD_INPUT
     except BrokenPipeError:  # whoever reads our output, such as `head`, has had enough
-        _give_up_stdout()
+        _give_up(sys.stdout)
         return EXIT_PIPE
     except OSError as error:
-        _give_up_stdout()
+        _give_up(sys.stdout)
         where = "" if error.filename is None else f"; got {error.filename!r}"
         print_error(MpgraspError(f"the system refused: {error.strerror or error}{where}"))
         return EXIT_BAD_INPUT
@@ -132,14 +143,17 @@ def check_gl() -> None:
         )
 
 
-def _give_up_stdout() -> None:
-    """Keep the interpreter from complaining, at its end, about what standard output did not take."""
+def _give_up(stream: TextIO) -> None:
+    """Keep the interpreter from complaining, at its end, about what a standard stream did not take."""
     try:
-        sys.stdout.flush()
+        stream.flush()
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def print_error(error: MpgraspError) -> None:
-    """Say on stderr, in one line, what is wrong."""
-    print("mpgrasp: error:", printable(" ".join(str(error).splitlines())), file=sys.stderr)
+    """Say on stderr, in one line, what is wrong; where nobody can read it, the exit code alone says it."""
+    try:
+        print("mpgrasp: error:", printable(" ".join(str(error).splitlines())), file=sys.stderr, flush=True)
+    except OSError:
+        _give_up(sys.stderr)

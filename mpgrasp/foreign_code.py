@@ -29,6 +29,10 @@ _EXIT = os._exit
 _AGAIN = 0.5  # [s], until somebody who has caught the error of the limit is told again
 
 
+class TimeLimitError(ConfigError):
+    """Foreign code takes longer than `load_limit()`."""
+
+
 class _Late(BaseException):
     """The limit is over; no Exception, so that `except Exception` in a plug-in does not swallow it."""
 
@@ -62,7 +66,8 @@ def contained(what: str, path: str) -> Iterator[None]:
         path: name of the plug-in, for errors.
 
     Raises:
-        ConfigError: it exits, interrupts or takes longer than `load_limit()`.
+        ConfigError: it exits or interrupts.
+        TimeLimitError: it takes longer than `load_limit()`.
     """
     limit, before, typed = load_limit(), working_directory(), [signal.SIGINT]
     try:
@@ -78,7 +83,7 @@ def contained(what: str, path: str) -> Iterator[None]:
         _refuse(f"{what} ends the program: os._exit({error.args[0]!r})", path, error)
     except _Late as error:
         allowed = f"less, or {LIMIT_VARIABLE}=SECONDS"
-        _refuse(f"{what} takes longer than {limit:g} s", path, error, allowed)
+        raise TimeLimitError(f"{what} takes longer than {limit:g} s", got=path, allowed=allowed) from error
     except KeyboardInterrupt as error:
         if typed:
             raise
@@ -87,8 +92,8 @@ def contained(what: str, path: str) -> Iterator[None]:
         _go_back(before, what, path)
 
 
-def _refuse(wrong: str, path: str, error: BaseException, allowed: str | None = None) -> NoReturn:
-    raise ConfigError(wrong, got=path, allowed=allowed or "a module that only defines its classes") from error
+def _refuse(wrong: str, path: str, error: BaseException) -> NoReturn:
+    raise ConfigError(wrong, got=path, allowed="a module that only defines its classes") from error
 
 
 def working_directory() -> str | None:

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Generic, TypeVar
 
 from mpgrasp.exceptions import MpgraspError
-from mpgrasp.foreign_code import contained
+from mpgrasp.foreign_code import TimeLimitError, contained
 
 Subject = TypeVar("Subject")
 
@@ -62,14 +62,31 @@ class Finding:
 
 
 def try_laws(laws: Iterable[Law[Subject]], subject: Subject, path: str) -> list[Finding]:
-    """Return the findings, one a law, whatever the code at `path` does meanwhile."""
-    return [_try(law, subject, path) for law in laws]
+    """Return the findings, one a law, whatever the code at `path` does meanwhile.
+
+    Once a check has met the time limit the others are skipped: each would wait as long.
+    """
+    findings: list[Finding] = []
+    hung = ""
+    for law in laws:
+        if hung:
+            reason = f'not tried after the check "{hung}" took too long'
+            findings.append(Finding(name=law.name, must=law.must, state=State.SKIPPED, reason=reason))
+            continue
+        try:
+            findings.append(_try(law, subject, path))
+        except TimeLimitError as error:
+            hung = law.name
+            findings.append(Finding(name=law.name, must=True, state=State.FAILED, reason=str(error)))
+    return findings
 
 
 def _try(law: Law[Subject], subject: Subject, path: str) -> Finding:
     try:
         with contained(f'the check "{law.name}"', path):
             state, reason = State.PASSED, law.check(subject)
+    except TimeLimitError:
+        raise
     except Skipped as why:
         state, reason = State.SKIPPED, str(why)
     except Broken as why:

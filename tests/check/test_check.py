@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -177,6 +178,26 @@ def test_a_controller_without_a_memory_of_failures_is_said_to_have_none(folder: 
     (finding,) = tried("controller", "forgetful:Sound", "remembers failures")
     assert finding.state is State.SKIPPED
     assert "remember_failure(position)" in finding.reason
+
+
+def test_after_a_check_that_hangs_the_others_are_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LIMIT_VARIABLE, "0.1")
+    tried: list[str] = []
+
+    def hangs(subject: int) -> str:
+        tried.append("slow")
+        time.sleep(30)
+        return ""
+
+    laws = [
+        Law(name="slow", must=False, check=hangs),  # an advice: that it hangs is more than slow
+        Law(name="other", check=lambda subject: tried.append("other") or ""),  # type: ignore[func-returns-value]
+    ]
+    findings = try_laws(laws, 0, "my:Net")
+    assert tried == ["slow"]
+    assert [finding.state for finding in findings] == [State.FAILED, State.SKIPPED]
+    assert findings[0].broken
+    assert findings[1].reason == 'not tried after the check "slow" took too long'
 
 
 def test_a_law_that_raises_is_broken_and_one_that_skips_is_not() -> None:

@@ -1,15 +1,17 @@
-"""Ends a run whose method fails alike from its first episode on: hours of error rows tell nothing new."""
+"""Ends a run whose method fails alike among its first episodes: hours of error rows tell nothing new."""
 
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 
 from mpgrasp.bench.playing.player import EpisodeError
 from mpgrasp.bench.record import Cell, ErrorLine, Line
 
-EPISODES = 3
-"""So many first episodes with the same error end the run."""
+FIRST = 5
+"""So many first episodes of a method are looked at: a wrong unit may pass unseen in one or two of them."""
+ALIKE = 3
+"""So many of them with the same error end the run."""
 
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 
@@ -24,16 +26,17 @@ class Patience:
         """Take note of a line.
 
         Raises:
-            EpisodeError: it is the last of a cell's first `EPISODES` episodes, all with the same error.
+            EpisodeError: it is the third of a cell's first five episodes with the same error.
         """
-        if not isinstance(line, ErrorLine) or line.episode >= EPISODES:
+        if not isinstance(line, ErrorLine) or line.episode >= FIRST:
             return
         cell = self._errors[line.task.cell]
         cell[line.episode] = line.error.removeprefix(str(line.task)).strip()
-        if len(cell) == EPISODES and len(set(map(_kind, cell.values()))) == 1:
+        kinds = Counter(map(_kind, cell.values()))
+        if kinds[_kind(cell[line.episode])] >= ALIKE:
             raise EpisodeError(
-                f"{line.task.cell.method} fails alike in its first {EPISODES} episodes of {line.suite}, "
-                f"so the run ends here and its finished episodes are kept: {cell[0]}"
+                f"{line.task.cell.method} fails alike in {ALIKE} of its first {FIRST} episodes of "
+                f"{line.suite}, so the run ends here and its finished episodes are kept: {cell[line.episode]}"
             )
 
 

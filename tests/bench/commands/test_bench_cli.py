@@ -160,14 +160,25 @@ def test_an_opengl_that_mujoco_could_not_load_is_one_line_even_for_rays(tmp_path
     assert done.stderr.count("\n") == 1
 
 
-def test_a_table_that_standard_output_does_not_take_is_one_line_and_results_are_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize("words", [["settings", "thin"], ["--help"]])
+def test_words_that_standard_output_does_not_take_are_one_line_of_error(words: list[str]) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "mpgrasp.bench", "settings", "thin"],
+            [sys.executable, "-m", "mpgrasp.bench", *words],
             stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr == "mpgrasp: error: the system refused: No space left on device\n"
+
+
+def test_where_standard_error_takes_nothing_the_exit_code_still_says_it() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "mpgrasp.bench", "thin", "--bogus"],
+            stdout=subprocess.PIPE, stderr=full, text=True, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stdout == ""
 
 
 def test_a_reader_that_has_had_enough_ends_a_command_silently() -> None:
@@ -268,7 +279,7 @@ def test_a_bug_on_the_way_is_counted_apart_from_failures_with_its_traceback(
     assert main(["thin", *PLUG_INS, "--out", str(tmp_path), "--quiet"]) == 1
     assert "ZeroDivisionError: a bug in a detector" in capsys.readouterr().err
     lines = records(tmp_path)
-    assert [line["outcome"] for line in lines[1:]] == ["error"] * 9
+    assert [line["outcome"] for line in lines[1:]] == ["error"] * 3
     assert lines[0]["outcome"] != "error"
     for line in lines[1:]:
         assert line["success"] is None
@@ -278,7 +289,7 @@ def test_a_bug_on_the_way_is_counted_apart_from_failures_with_its_traceback(
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert not summary["complete"]
     (cell,) = summary["cells"]
-    assert (cell["n"], cell["errors"], sum(cell["failures"].values())) == (1, 9, 1 - cell["successes"])
+    assert (cell["n"], cell["errors"], sum(cell["failures"].values())) == (1, 3, 1 - cell["successes"])
 
 
 def test_weights_go_to_the_detector_they_name() -> None:
