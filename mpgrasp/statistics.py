@@ -58,8 +58,8 @@ def wilcoxon(gain: Sequence[float] | FloatArray) -> tuple[float, bool]:
     values = np.asarray(gain, float)
     if not np.any(values):
         return 1.0, False
-    up = float(signed_rank(values, alternative="greater").pvalue)
-    return float(signed_rank(values).pvalue), up < 0.5
+    up, down = (float(signed_rank(values, alternative=side).pvalue) for side in ("greater", "less"))
+    return float(signed_rank(values).pvalue), up < down
 
 
 def smallest_p(n: int) -> float:

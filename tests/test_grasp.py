@@ -16,6 +16,7 @@ from mpgrasp.grasp import (
     GraspRectangle,
     best_pixel,
     image_to_world_angle,
+    peak_height,
     peaks,
     world_to_image_angle,
 )
@@ -194,6 +195,23 @@ def test_peaks_find_every_bump_once_best_first() -> None:
     assert peaks(quality, threshold=0.1, distance=8).tolist() == [[20, 30], [40, 110], [70, 100]]
     assert peaks(quality, threshold=0.1, distance=8, count=1).tolist() == [[20, 30]]
     assert peaks(quality, threshold=0.1, distance=60).tolist() == [[20, 30], [40, 110]]
+
+
+def test_peaks_come_best_first_whatever_row_they_lie_in_and_never_at_a_hole() -> None:
+    quality = np.zeros((60, 80))
+    heights = {(10, 70): 0.3, (20, 10): 0.9, (30, 50): 0.5, (50, 30): 0.7}
+    for place, height in heights.items():
+        quality[place] = height
+    quality[40, 70] = np.nan
+    expected = sorted(heights, key=lambda place: -heights[place])
+    assert [tuple(place) for place in peaks(quality, threshold=0.1, distance=5)] == expected
+
+
+def test_a_hole_is_no_peak_and_hides_none() -> None:
+    quality = np.zeros((20, 30))
+    quality[5:8, 5:8] = 0.6
+    quality[15, 20] = np.nan
+    assert peak_height(quality) == pytest.approx(0.6)
 
 
 def test_peaks_of_an_empty_map_are_none_and_of_a_flat_top_are_one() -> None:

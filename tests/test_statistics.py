@@ -23,8 +23,10 @@ from mpgrasp.statistics import (
 def test_wilson_bounds_lie_where_the_score_test_just_rejects(successes: int, n: int) -> None:
     # independent of scipy: at a bound p, |rate - p| equals z standard errors under p
     z = 1.959963984540054
-    for p in wilson_interval(successes, n):
-        if 0 < p < 1:
+    low, high = wilson_interval(successes, n)
+    assert (low == pytest.approx(0, abs=1e-12), high == 1) == (successes == 0, successes == n)
+    for p in (low, high):
+        if 1e-12 < p < 1:
             assert abs(successes / n - p) == pytest.approx(z * math.sqrt(p * (1 - p) / n), rel=1e-6)
 
 
@@ -79,7 +81,9 @@ def test_the_bootstrap_of_as_many_ones_as_zeros_is_binomial() -> None:
     assert mean_interval([0.0, 1.0] * 8) == (0.5, low / 16, 1 - low / 16)
 
 
-@pytest.mark.parametrize("gain", [[3.0, -1.0, 2.0, 5.0], [1.0, 2.0, 3.0, 4.0, 5.0, -6.0], [-1.0, -2.0]])
+@pytest.mark.parametrize(
+    "gain", [[3.0, -1.0, 2.0, 5.0], [1.0, 2.0, 3.0, 4.0, 5.0, -6.0], [-1.0, -2.0], [1.0], [1.0, 2.0, -3.0]]
+)
 def test_the_signed_rank_test_counts_the_signs_that_are_as_extreme(gain: list[float]) -> None:
     order = sorted(gain, key=abs)
     ranks = range(1, len(gain) + 1)

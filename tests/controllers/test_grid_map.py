@@ -178,13 +178,22 @@ def test_pixels_without_a_return_do_not_count_as_seen() -> None:
         assert forgiving.counts.sum() == 1
 
 
-def test_cells_on_the_border_of_the_published_grid_are_never_the_best() -> None:
-    corner = one_point(0.9, 0.0, (0.459, -0.041))
+@pytest.mark.parametrize("cell", [(0, 0), (0, 2), (4, 1), (1, 0), (3, 4)])
+def test_cells_on_the_border_of_the_published_grid_are_never_the_best(cell: tuple[int, int]) -> None:
     grids = GridMap(SMALL), GridMap(replace(SMALL, border_counts=True))
+    x, y = grids[0].position(cell)
     for grid in grids:
-        grid.update(corner)
+        grid.update(one_point(0.9, 0.0, (x, y)))
     assert grids[0].best_cell() is None
-    assert grids[1].best_cell() == (0, 0)
+    assert grids[1].best_cell() == cell
+
+
+@pytest.mark.parametrize("cell", [(1, 1), (1, 3), (3, 1), (3, 3)])
+def test_cells_next_to_the_border_can_be_the_best(cell: tuple[int, int]) -> None:
+    grid = GridMap(SMALL)
+    x, y = grid.position(cell)
+    grid.update(one_point(0.9, 0.0, (x, y)))
+    assert grid.best_cell() == cell
 
 
 def test_a_robust_map_where_all_is_in_the_lowest_bin_has_no_best_grasp() -> None:
@@ -250,7 +259,7 @@ def test_a_failure_fades_by_half_with_every_other_one() -> None:
         {"cell": 0.0},
         {"cell": 1.0},
         {"n_quality": 1},
-        {"n_angle": 0},
+        {"n_angle": 1},
         {"z_floor": 0.2},
         {"evidence": -1.0},
         {"failure_sigma": 0.0},
@@ -259,3 +268,7 @@ def test_a_failure_fades_by_half_with_every_other_one() -> None:
 def test_settings_that_make_no_grid_are_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         GridConfig(**settings)
+
+
+def test_a_grid_may_be_a_single_cell() -> None:
+    assert GridConfig(extent=0.1, cell=0.1).shape == (1, 1)

@@ -33,6 +33,18 @@ def test_an_empty_histogram_is_maximally_uncertain_with_and_without_prior() -> N
         np.testing.assert_allclose(cell_entropy(empty, prior), math.log(10), rtol=1e-6)
 
 
+def test_whole_counts_have_the_entropy_of_the_same_numbers_as_fractions() -> None:
+    counts = np.array([[3, 0, 1], [0, 0, 5]])
+    for prior in (0.0, 2.0, 0.5):
+        np.testing.assert_allclose(cell_entropy(counts, prior), cell_entropy(counts.astype(float), prior))
+
+
+def test_nothing_is_less_uncertain_than_certain_and_an_empty_cell_divides_by_nothing() -> None:
+    counts = np.concatenate([np.eye(10) * n for n in (1, 3, 7, 49, 4099)] + [np.zeros((1, 10))])
+    with np.errstate(all="raise"):
+        assert (cell_entropy(counts.astype(np.float32)) >= 0).all()
+
+
 def test_entropy_agrees_with_the_sum_written_out() -> None:
     rng = np.random.default_rng(0)
     counts = rng.integers(0, 20, (4, 5, 10)).astype(np.float32)

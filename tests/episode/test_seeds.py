@@ -64,3 +64,9 @@ def test_streams_are_those_that_published_runs_were_drawn_from(seed: int) -> Non
     for attempt, stream in ((0, [seed, 13]), (3, [seed, 13, 3])):
         expected = int(np.random.default_rng(stream).integers(4294967296))
         assert seeds.controller_seed(seed, attempt) == expected
+
+
+def test_the_first_attempt_is_told_what_a_lone_one_is_told() -> None:
+    assert [seeds.controller_seed(seed) for seed in range(5)] == [
+        seeds.controller_seed(seed, 0) for seed in range(5)
+    ]

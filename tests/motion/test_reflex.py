@@ -99,6 +99,27 @@ def test_a_joint_at_its_limit_that_makes_no_other_jump_stops_nothing() -> None:
     assert check(ReflexMonitor(), solution=leaning) is None
 
 
+@pytest.mark.parametrize("joint", [1, 4, 7])
+def test_a_joint_may_be_at_either_end_of_its_range_and_is_told_the_end_that_it_has_left(joint: int) -> None:
+    config = ReflexConfig()
+    for bound, way in ((config.q_min[joint - 1], -1.0), (config.q_max[joint - 1], 1.0)):
+        at_the_end = np.array(panda.Q_HOME)
+        at_the_end[joint - 1] = bound
+        assert check(ReflexMonitor(config), q=at_the_end) is None
+        reflex = check(ReflexMonitor(config), q=at_the_end + one(joint, way * 0.01))
+        assert reflex is not None
+        assert (reflex.limit, reflex.bound, reflex.demanded) == ("joint_position", bound, False)
+
+
+def test_a_turn_is_measured_by_the_rotation_alone() -> None:
+    bounds = ReflexConfig(cartesian_velocity=2.0, cartesian_rotation=1.0)
+    assert check(ReflexMonitor(bounds), twist=np.array([0, 0, 1.9, 0, 0, 0.9])) is None
+    assert check(ReflexMonitor(bounds), twist=np.array([2.0, 0, 0, 0, 1.0, 0])) is None  # at both bounds
+    reflex = check(ReflexMonitor(bounds), solution=solution(feasible=False))
+    assert reflex is not None
+    assert (reflex.value, reflex.bound) == (1.0, 0.0)  # of none feasible, one asked
+
+
 def test_a_stop_reads_well() -> None:
     reflex = Reflex(limit="joint_velocity", joint=4, value=2.31, bound=2.175, time=3.4)
     assert str(reflex) == "joint_velocity: joint 4 at 2.31 rad/s, bound 2.175 rad/s, t = 3.40 s"
