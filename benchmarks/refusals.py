@@ -57,6 +57,8 @@ class Trial:
     said: str
     """Regular expression of what is said."""
     code: int = 2
+    limit: float = LIMIT
+    """Wall-clock time within which it must have ended [s]."""
     environment: Mapping[str, str] = field(default_factory=dict)
     one_line: bool = True
     """True if there must be one line on stderr and nothing else."""
@@ -92,7 +94,7 @@ def run(argv: Sequence[str], folder: Path, environment: Mapping[str, str], limit
 def fault_of(trial: Trial, ended: Ended) -> str:
     """What is wrong with the way in which a process has ended; "" if nothing is."""
     if ended.code is None:
-        return f"still at work after {LIMIT:g} s"
+        return f"still at work after {trial.limit:g} s"
     if "Traceback (most recent call last)" in ended.out + ended.err:
         return "a traceback"
     if ended.code != trial.code:
@@ -122,7 +124,7 @@ def play(trial: Trial, cache: Path) -> dict[str, object]:
         folder = Path(name)
         argv = list(trial.set_up(folder))
         before = content(folder)
-        ended = run(argv, folder, {"MPGRASP_CACHE": str(cache), **trial.environment})
+        ended = run(argv, folder, {"MPGRASP_CACHE": str(cache), **trial.environment}, trial.limit)
         fault = fault_of(trial, ended)
         if not fault and trial.one_line and content(folder) != before:
             fault = f"left behind: {sorted(set(content(folder).items()) ^ set(before.items()))}"
