@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +69,31 @@ def test_a_directory_with_another_run_is_refused_and_left_alone(tmp_path: Path) 
     with pytest.raises(OutputError, match=r"another run \(seed: 0 there, 1 here\)"):
         RunDirectory.create(tmp_path, record_of(RunDescription, run_row(configuration_row(seed=1))))
     assert {path: path.read_bytes() for path in tmp_path.glob("*.json*")} == before
+
+
+@pytest.mark.parametrize(("files", "shown"), [("ab", "a, b"), ("abc", "a, b, c"), ("dcba", "a, b, c, ...")])
+def test_a_directory_of_other_files_is_refused_by_their_names(tmp_path: Path, files: str, shown: str) -> None:
+    for name in files:
+        (tmp_path / name).write_text("mine")
+    with pytest.raises(OutputError, match=re.escape(f"holds no run ({shown});")):
+        RunDirectory.create(tmp_path, RUN)
+
+
+def test_lines_may_be_read_by_whom_the_user_lets(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        directory = RunDirectory.create(tmp_path / "run", RUN)
+    finally:
+        os.umask(before)
+    assert directory.episodes_file.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize("read", [read_lines, read_run, read_summary])
+def test_files_that_cannot_be_read_are_an_output_error(
+    read: Callable[[Path], object], tmp_path: Path
+) -> None:
+    with pytest.raises(OutputError, match=str(tmp_path)):
+        read(tmp_path)
 
 
 def test_a_complete_run_again_starts_afresh_and_keeps_the_lines_of_every_time(tmp_path: Path) -> None:
