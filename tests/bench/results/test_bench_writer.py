@@ -88,7 +88,7 @@ def test_lines_may_be_read_by_whom_the_user_lets(tmp_path: Path) -> None:
     assert directory.episodes_file.stat().st_mode & 0o777 == 0o640
 
 
-@pytest.mark.parametrize("read", [read_lines, read_run, read_summary])
+@pytest.mark.parametrize("read", [read_lines, read_run])
 def test_files_that_cannot_be_read_are_an_output_error(
     read: Callable[[Path], object], tmp_path: Path
 ) -> None:
