@@ -298,6 +298,27 @@ def first_picks(run: str, detector: str, controller: str) -> int:
     return sum(line["picks"][0]["outcome"] == "success" for line in cell(run, detector, controller).values())
 
 
+def attempts(run: str, detector: str, controller: str) -> list[dict[str, Any]]:
+    """Return all picks of all tables."""
+    return [pick for line in cell(run, detector, controller).values() for pick in line["picks"]]
+
+
+def grasps_where_next_to_nothing_was_seen(run: str, detector: str, controller: str) -> tuple[int, int]:
+    """Return the grasps at a cell with one count in the lowest of 10 bins beside the prior, and all grasps.
+
+    The prior is one count in each of 18 x 10 bins, whose mean is 0.5.
+    """
+    once = (18 * 10 * 0.5 + 0.05) / (18 * 10 + 1)
+    claimed = [pick["grasp"]["quality"] for pick in attempts(run, detector, controller) if pick["grasp"]]
+    return sum(abs(quality - once) < 1e-6 for quality in claimed), len(claimed)
+
+
+def singular_stops(run: str, detector: str, controller: str) -> tuple[int, int]:
+    """Return the stops of a reach after a singular value below 0.05, and all of them."""
+    stopped = [pick for pick in attempts(run, detector, controller) if pick["reflex"]]
+    return sum(pick["min_singular_value"] < 0.05 for pick in stopped), len(stopped)
+
+
 def peaks_at_first_look(run: str) -> float:
     """Return the share of picks whose first view had a peak [%], over networks in closed loop."""
     picks = [
