@@ -19,7 +19,7 @@ from bad_suites import BAD_SUITES
 from mesh_writers import box, stl
 
 HERE = Path(__file__).resolve().parent
-RUN = HERE / "results" / "thin-2mm-dhrnet"
+RUN = HERE / "results" / "sticks-of-2mm" / "dhrnet"
 """A published run, whose first episodes become the run that commands are given."""
 PACKAGES = ("bench", "scene", "detectors", "training")
 """Programs that are `python -m mpgrasp.PROGRAM`; the others are scripts beside this file."""

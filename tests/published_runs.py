@@ -216,13 +216,7 @@ def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
         "least singular value": least_singular_value,
         "blind drift, mm": blind_drift,
     }
-    return measures[column](run_of_sticks(name), name, controller.strip("`"))
-
-
-def run_of_sticks(detector: str) -> str:
-    """Return the latest run with sticks of 2 mm of a detector."""
-    latest = f"sticks-of-2mm/{detector}"
-    return latest if (RESULTS / latest).is_dir() else f"thin-2mm-{detector}"
+    return measures[column](f"sticks-of-2mm/{name}", name, controller.strip("`"))
 
 
 def oracle_lifts(rung: str, column: str) -> Any:
