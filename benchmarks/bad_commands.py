@@ -231,6 +231,7 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("run_time --network resnet", "unknown network; got 'resnet'"),
     ("same_bits thick", "unknown suite; got 'thick'"),
     ("same_bits --controller pid", "unknown controller; got 'pid'"),
+    ("same_bits --settings blas", "unknown settings; got ['blas']; allowed: reference, blas-haswell"),
     ("table --bogus", "unrecognized arguments: --bogus"),
     ("thickness --camera eye", "invalid choice: 'eye'"),
     ("thickness --detector oracle --out file", _TAKEN),

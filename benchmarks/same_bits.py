@@ -21,7 +21,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bit_settings import REFERENCE, SETTINGS, NotHere, play_if_here, source_hash
+from bit_settings import REFERENCE, SETTINGS, NotHere, Setting, play_if_here, source_hash
 from study import (
     RESULTS,
     Parser,
@@ -137,8 +137,22 @@ def draw(rows: Sequence[Mapping[str, Any]]) -> Figure:
     return picture
 
 
+def chosen_settings(names: str | None) -> tuple[Setting, ...]:
+    """The reference and the settings of those names; all where there is no choice.
+
+    Raises:
+        ConfigError: an unknown name.
+    """
+    if names is None:
+        return SETTINGS
+    known = {setting.name: setting for setting in SETTINGS}
+    if unknown := [name for name in names.split(",") if name not in known]:
+        raise ConfigError("unknown settings", got=unknown, allowed=list(known))
+    return tuple(known[name] for name in dict.fromkeys((REFERENCE.name, *names.split(","))))
+
+
 def play_all(
-    told: Mapping[str, Any], command: Sequence[str], out: Path
+    told: Mapping[str, Any], command: Sequence[str], settings: Sequence[Setting], out: Path
 ) -> tuple[dict[str, Played], dict[str, str]]:
     """Play what is not kept yet; return all that is, and why the others cannot be played here.
 
@@ -148,7 +162,7 @@ def play_all(
     played: dict[str, Played] = {}
     missing: dict[str, str] = {}
     here = instruction_sets()
-    for setting in track(SETTINGS, "settings", len(SETTINGS)):
+    for setting in track(settings, "settings", len(settings)):
         try:
             played[setting.name] = kept(
                 out / "settings" / f"{setting.name}.json",
@@ -169,16 +183,18 @@ def _study(command: Sequence[str]) -> None:
     add("--detector", metavar="D[,D]", default="dhrnet", help="default: %(default)s")
     add("--controller", metavar="C", default="mppc_robust", help="default: %(default)s")
     add("--episodes", metavar="N", type=COUNT, default=200, help="of each detector (default: 200)")
+    add("--settings", metavar="S[,S]", help="play these alone, beside the reference (default: all)")
     add("--seed", metavar="S", type=SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/same-bits")
     options = parser.parse_args(command)
+    settings = chosen_settings(options.settings)
     told = _settings(options.suite, options.detector, options.controller)
     told |= {"episodes": options.episodes, "seed": options.seed}
-    run = about("same_bits", command, settings=told, varied=[asdict(setting) for setting in SETTINGS])
+    run = about("same_bits", command, settings=told, varied=[asdict(setting) for setting in settings])
     begin(options.out, run)
     plays = [options.suite, "--detector", options.detector, "--controller", options.controller]
     plays += ["--episodes", str(options.episodes), "--seed", str(options.seed)]
-    played, missing = play_all(told, plays, options.out)
+    played, missing = play_all(told, plays, settings, options.out)
     rows = evaluate(played)
     if not rows:
         raise ConfigError("no setting but the reference can be played here", got=list(missing))

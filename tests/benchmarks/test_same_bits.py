@@ -190,6 +190,16 @@ def test_every_setting_plays_the_same_episodes_by_the_benchmarks_command_line(
     assert "25.0 [4.6-69.9]" in torch
 
 
+def test_some_settings_alone_are_played_beside_the_reference(bench: Bench, tmp_path: Path) -> None:
+    words = ["thin", "--episodes", "4", "--settings", "camera-ray,runtime-torch", "--out", str(tmp_path)]
+    assert same_bits.main(words) == 0
+    assert len(bench.told) == 3
+    rows = json.loads((tmp_path / "same-bits.json").read_text())["rows"]
+    assert [row["setting"] for row in rows] == ["camera-ray", "runtime-torch"]
+    varied = json.loads((tmp_path / "run.json").read_text())["varied"]
+    assert [setting["name"] for setting in varied] == ["reference", "camera-ray", "runtime-torch"]
+
+
 def test_what_is_kept_is_not_played_again_and_what_was_begun_is_resumed(bench: Bench, tmp_path: Path) -> None:
     command = ["--episodes", "4", "--out", str(tmp_path)]
     assert same_bits.main(command) == 0
