@@ -90,7 +90,7 @@ class Killed:
             process.wait()
         fault = _left_alive(process.pid)
         lines = _whole_lines(out)
-        if not fault and lines[: len(before)] != before:
+        if not fault and not set(before) <= set(lines):  # a run that ends puts them into its order
             fault = "lines that were written are gone"
         struck = f"after {after:.2f} s, at {len(lines)} of {self.episodes} episodes"
         return row_of("SIGKILL", f"{number}: {struck}", fault, time.monotonic() - clock)

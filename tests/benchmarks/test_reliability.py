@@ -16,7 +16,12 @@ import pytest
 import reliability
 from bench_runs import error_row, grasp_row
 from refusals import Ended, Trial, ended_by_errors, found_out, play, run, trials
+from small_disks import holds_the_same
+from toy_recordings import play as play_toy
+from toy_recordings import toy_simulation
 from whole_runs import different, fault_at_end
+
+from mpgrasp.recording.rerun import RerunRecorder
 
 WELL = "import sys; print('mpgrasp: error: no such thing', file=sys.stderr); sys.exit(2)"
 
@@ -171,3 +176,13 @@ def test_the_quick_part_has_no_fault(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert results["kinds"]["SIGKILL"]["n"] == 2
     assert "Results: " in capsys.readouterr().out
     assert not (tmp_path / "parts").exists()
+
+
+def test_recordings_hold_the_same_if_their_rows_are_and_a_cut_one_does_not(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    paths = [tmp_path / f"{name}.rrd" for name in "abc"]
+    for path in paths:
+        play_toy(RerunRecorder(path), toy_simulation())
+    paths[2].write_bytes(paths[2].read_bytes()[: paths[2].stat().st_size // 2])
+    assert holds_the_same(paths[0], paths[1])
+    assert not holds_the_same(paths[2], paths[0])
