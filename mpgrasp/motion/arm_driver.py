@@ -21,7 +21,7 @@ from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.motion_statistics import MotionMeter, MotionStatistics
 from mpgrasp.motion.reflex import MeasuredArm, Reflex, ReflexMonitor
 from mpgrasp.motion.time_scaling import scaled_profile
-from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, integrate_pose, pose_error
+from mpgrasp.motion.trajectory import MotionConfig, TwistRamp, integrate_pose, mean_of, pose_error
 from mpgrasp.scene.simulation import Simulation
 
 FORCE_WINDOW = 5
@@ -98,7 +98,7 @@ class ArmDriver:
     @property
     def external_force(self) -> float:
         """External force on the robot, mean over `FORCE_WINDOW` ticks [N]: what a stop is judged by."""
-        return norm(np.mean(self._forces, axis=0))
+        return norm(mean_of(self._forces))
 
     @property
     def min_singular_value(self) -> float:

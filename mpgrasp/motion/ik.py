@@ -1,8 +1,9 @@
 """Differential inverse kinematics of the arm: a desired tool pose or twist in, joint velocity out.
 
 A quadratic program (mink, daqp) follows the desired pose within joint position, joint velocity and
-collision limits. Beside its answer stands `demanded_dq`, the joint velocity that the motion would
-have needed without any limit, so that a protective stop can see what the program had to give up.
+collision limits; its answer without any limit is taken where that meets them all. Beside its answer stands
+`demanded_dq`, the joint velocity that the motion would have needed without any limit, so that a protective
+stop can see what the program had to give up.
 
 References:
     Yoshikawa, "Manipulability of Robotic Mechanisms", IJRR 4(2), 1985.
@@ -19,14 +20,16 @@ import numpy as np
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, transform
-from mpgrasp.linear_algebra import least_norm, norm, product, svd
+from mpgrasp.linear_algebra import Svd, least_norm, norm, product, svd
 from mpgrasp.motion.ik_config import IkConfig
-from mpgrasp.motion.ik_program import ClearanceLimit, ToolTask
+from mpgrasp.motion.ik_program import Clearance, ClearanceLimit, ToolTask, free_step
 from mpgrasp.motion.ik_solution import IkSolution
 from mpgrasp.motion.trajectory import integrate_pose, pose_error
 from mpgrasp.robot import panda
 
 TCP_SITE = "tcp"
+_CLOSED = 0.95
+"""Share of the way to a joint limit that the program closes in a tick at most; mink's default."""
 
 _Blocked = tuple[str, int | None, float, float]
 """A limit that holds the motion back: its name, joint, value and bound."""
@@ -52,10 +55,11 @@ class DifferentialIK:
         self._collision_limits: dict[float, ClearanceLimit] = {}
         names = [self.model.joint(j).name for j in range(self.model.njnt)]
         self._limits: list[mink.Limit] = [
-            mink.ConfigurationLimit(self.model, min_distance_from_limits=margin),
+            mink.ConfigurationLimit(self.model, gain=_CLOSED, min_distance_from_limits=margin),
             mink.VelocityLimit(self.model, dict(zip(names, self._dq_max, strict=True))),
         ]
         self._pairs = panda.collision_pairs(self.model) if self.config.collisions else []
+        self._clearance = Clearance(self.model, self._geom_pairs(), self.config.collision_range)
         self._swing = np.zeros(7)
 
     def reset(self) -> None:
@@ -99,18 +103,7 @@ class DifferentialIK:
             swing = self._swing
         else:
             swing = posture_rate * towards_home
-        task = ToolTask(J, error, swing * dt, self.config.posture_cost)
-        limits = [*self._limits, *self._collision_limit(dt)]
-        try:
-            dq = mink.solve_ik(
-                self.configuration, [task], dt, "daqp",
-                damping=self.config.damping, limits=limits,
-            )  # fmt: skip
-            feasible = bool(np.all(np.isfinite(dq)))
-        except mink.NoSolutionFound:
-            feasible = False
-        if not feasible:
-            dq = np.zeros(7)
+        dq, feasible = self._answer(q, J, factors, error, swing * dt, dt)
         left = error - product(J, dq) * dt
         residual, residual_angle = norm(left[:3]), norm(left[3:])
         blocked = self._joint_limit(q, dq, demanded, dt)
@@ -165,10 +158,42 @@ class DifferentialIK:
             allowed="tool down, up to 0.75 m from the base at 0.4 m height and 0.79 m near the table",
         )
 
+    def _answer(
+        self, q: FloatArray, J: FloatArray, factors: Svd, error: FloatArray, swing: FloatArray, dt: float
+    ) -> tuple[FloatArray, bool]:
+        """Joint velocity (7,) of the program at the last pose, and whether it has one; zero if not."""
+        c = self.config
+        if c.posture_cost + c.damping > 0:
+            step = free_step(factors, error, swing, c.posture_cost, c.damping)
+            if self._is_free(q, step, dt):
+                return step / dt, True
+        task = ToolTask(J, error, swing, c.posture_cost)
+        limits = [*self._limits, *self._collision_limit(dt)]
+        try:
+            dq = mink.solve_ik(self.configuration, [task], dt, "daqp", damping=c.damping, limits=limits)
+        except mink.NoSolutionFound:
+            return np.zeros(7), False
+        return (dq, True) if np.all(np.isfinite(dq)) else (np.zeros(7), False)
+
+    def _is_free(self, q: FloatArray, step: FloatArray, dt: float) -> bool:
+        """True if a step (7,) [rad] meets every limit of the program, at the last pose."""
+        room_up, room_down = _CLOSED * (self._q_max - q), _CLOSED * (q - self._q_min)
+        within = (step <= room_up) & (-step <= room_down) & (np.abs(step) <= self._dq_max * dt)
+        return bool(within.all()) and self._clearance.is_ample(self.configuration.data)
+
     def _jacobian(self) -> FloatArray:
         J = np.empty((6, 7))
         mujoco.mj_jacSite(self.model, self.configuration.data, J[:3], J[3:], self._site)
         return J
+
+    def _geom_pairs(self) -> list[tuple[int, int]]:
+        """Pairs of geoms that must not collide."""
+        return [
+            (self.model.geom(a).id, self.model.geom(b).id)
+            for some, others in self._pairs
+            for a in some
+            for b in others
+        ]
 
     def _collision_limit(self, dt: float) -> list[mink.Limit]:
         if not self._pairs:

@@ -1,9 +1,12 @@
-"""Parts of the quadratic program of the differential inverse kinematics, for mink to put together.
+"""Parts of the quadratic program of the differential inverse kinematics, and its answer without limits.
 
-mink has both, but multiplies with BLAS, whose kernel decides over the last digit (`mpgrasp.linear_algebra`).
+mink has the parts too, but multiplies with BLAS, whose kernel decides over the last digit
+(`mpgrasp.linear_algebra`).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import mink
 import mujoco
@@ -11,7 +14,7 @@ import numpy as np
 from mink.tasks import BaseTask
 
 from mpgrasp.geometry import FloatArray
-from mpgrasp.linear_algebra import product
+from mpgrasp.linear_algebra import Svd, product
 
 
 class ToolTask(BaseTask):
@@ -34,6 +37,26 @@ class ToolTask(BaseTask):
         H = product(self._J.T, self._J)
         H.flat[:: len(H) + 1] += self._weight
         return mink.Objective(H, -product(self._J.T, self._error) - self._weight * self._swing)
+
+
+def free_step(
+    factors: Svd, error: FloatArray, swing: FloatArray, posture_cost: float, damping: float
+) -> FloatArray:
+    """Return the step (7,) [rad] that is the best of all, limits or not: the program's answer without any.
+
+    Args:
+        factors: of the tool Jacobian.
+        error: as in `ToolTask`.
+        swing: as there.
+        posture_cost: as there.
+        damping: added to the diagonal of the program's Hessian; one of the two must be above 0.
+    """
+    weight = posture_cost**2
+    Vt, sigma = factors.Vt, factors.sigma
+    along = product(Vt, swing)
+    for_tool = (sigma * product(factors.U.T, error) + weight * along) / (sigma * sigma + (weight + damping))
+    share = weight / (weight + damping)
+    return product(Vt.T, for_tool - share * along) + share * swing
 
 
 class ClearanceLimit(mink.CollisionAvoidanceLimit):
@@ -59,3 +82,36 @@ class ClearanceLimit(mink.CollisionAvoidanceLimit):
         if not rows:
             return mink.Constraint()
         return mink.Constraint(G=np.array(rows), h=np.array(bounds))
+
+
+class Clearance:
+    """Knows where nothing that must not collide is near, without measuring in every tick.
+
+    Between two postures no distance within the arm, or to what stands still, changes by more than
+    `LEVER` times the sum of what the joints have turned.
+    """
+
+    LEVER = 1.3
+    """Farthest that a point of arm or hand is from the axis of a joint that moves it [m], and more."""
+    _SIGHT = 0.3
+    """Distances up to this one are measured [m]: the farther one looks, the longer one need not."""
+
+    def __init__(self, model: mujoco.MjModel, pairs: Sequence[tuple[int, int]], near: float) -> None:
+        """Look after pairs of geoms; `near` is the distance from which on they matter [m]."""
+        self._model, self._pairs, self._near = model, pairs, near
+        self._q = np.full(model.nq, np.inf)
+        self._spare = -np.inf  # distance to `near` at _q
+
+    def is_ample(self, data: mujoco.MjData) -> bool:
+        """True if no pair is as near as that; `data` has the kinematics of its positions."""
+        if not self._pairs:
+            return True
+        turned = float(np.abs(data.qpos - self._q).sum())
+        if turned * self.LEVER < self._spare:
+            return True
+        self._q = data.qpos.copy()
+        self._spare = (
+            min(mujoco.mj_geomDistance(self._model, data, a, b, self._SIGHT, None) for a, b in self._pairs)
+            - self._near
+        )
+        return self._spare > 0

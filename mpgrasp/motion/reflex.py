@@ -173,10 +173,11 @@ class ReflexMonitor:
 
     def _joints(self, arm: MeasuredArm, solution: IkSolution, ddq: FloatArray) -> Reflex | None:
         c, q = self.config, arm.q
-        for j in range(7):
-            if not c.q_min[j] <= q[j] <= c.q_max[j]:
-                bound = c.q_min[j] if q[j] < c.q_min[j] else c.q_max[j]
-                return _reflex("joint_position", arm.time, q[j], bound, joint=j + 1)
+        within = (q >= c.q_min) & (q <= c.q_max)  # False for NaN too
+        if not within.all():
+            j = int(np.argmin(within))
+            bound = c.q_min[j] if q[j] < c.q_min[j] else c.q_max[j]
+            return _reflex("joint_position", arm.time, q[j], bound, joint=j + 1)
         over = _worst("joint_velocity", arm.time, arm.dq, c.dq_max)
         if over is not None:
             return over
@@ -251,8 +252,7 @@ def _worst(
 ) -> Reflex | None:
     """The joint that breaks its symmetric bound by the largest factor, if any does."""
     ratio = np.abs(values) / bounds
-    j = int(np.argmax(ratio))
-    # `not <=` also catches NaN
-    if np.all(ratio <= 1.0):
+    if (ratio <= 1.0).all():  # False for NaN too
         return None
+    j = int(np.argmax(ratio))
     return _reflex(limit, time, values[j], np.copysign(bounds[j], values[j]), joint=j + 1, demanded=demanded)

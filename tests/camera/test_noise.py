@@ -1,10 +1,12 @@
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from mpgrasp.camera.config import D435_INTRINSICS
-from mpgrasp.camera.noise import DepthNoise, apply
+from mpgrasp.camera.noise import DepthNoise, apply, white_noise
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 
@@ -156,3 +158,20 @@ def test_stress_mode_multiplies_the_depth() -> None:
 def test_impossible_sensors_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match="allowed"):
         DepthNoise(**bad)
+
+
+def test_white_noise_is_normal_and_no_two_images_of_a_generator_are_alike() -> None:
+
+    rng = np.random.default_rng(0)
+    images = [white_noise((300, 400), rng) for _ in range(4)]
+    for image in images:
+        assert image.mean() == pytest.approx(0, abs=0.012)
+        assert image.std() == pytest.approx(1, abs=0.01)
+        assert kstest(image[::7, ::7].ravel(), "norm").pvalue > 1e-3
+        beside, below = (image[:, :-1] * image[:, 1:]).mean(), (image[:-1] * image[1:]).mean()
+        assert abs(beside) < 0.012
+        assert abs(below) < 0.012
+    for one, other in combinations(images, 2):
+        assert abs((one * other).mean()) < 0.012
+    again = white_noise((300, 400), np.random.default_rng(0))
+    assert again.tobytes() == images[0].tobytes()
