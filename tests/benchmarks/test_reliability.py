@@ -178,6 +178,7 @@ def test_the_quick_part_has_no_fault(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert not (tmp_path / "parts").exists()
 
 
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_recordings_hold_the_same_if_their_rows_are_and_a_cut_one_does_not(tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     paths = [tmp_path / f"{name}.rrd" for name in "abc"]
