@@ -9,6 +9,7 @@ for all, that is the mean of min(time, limit), and no time is lost by censoring.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any, Literal
@@ -23,6 +24,8 @@ SIGNIFICANCE = 0.05
 """A corrected p below this is called significant."""
 RESAMPLES = 9999
 """Number of resamples of the bootstrap; its generator always starts from the same seed."""
+MOST_RESAMPLED = 2000
+"""More values than these are not resampled; the bounds by formula then differ by hundredths of the width."""
 
 
 def wilson_interval(successes: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -87,8 +90,21 @@ def holm(p: Sequence[float]) -> list[float]:
 def mean_interval(
     values: Sequence[float] | FloatArray, confidence: float = CONFIDENCE
 ) -> tuple[float, float, float]:
-    """Return the mean with its bootstrap interval: (mean, low, high); bounds are NaN below two values."""
-    return _bootstrap(values, np.mean, "BCa", confidence)
+    """Return the mean with its bootstrap interval: (mean, low, high); bounds are NaN below two values.
+
+    Of more than `MOST_RESAMPLED` values it is the normal interval with Edgeworth's correction for skewness
+    (Hall, The Bootstrap and Edgeworth Expansion, 1992): resampling takes gigabytes to say the same.
+    """
+    sample = np.asarray(values, float)
+    if len(sample) <= MOST_RESAMPLED:
+        return _bootstrap(sample, np.mean, "BCa", confidence)
+    from scipy.stats import norm, skew
+
+    n, centre, deviation = len(sample), float(sample.mean()), float(sample.std())
+    z = float(norm.ppf((1 + confidence) / 2))
+    half = z * deviation / math.sqrt(n)
+    shift = float(skew(sample)) * (1 + 2 * z * z) / 6 * deviation / n if deviation > 0 else 0.0
+    return centre, centre + shift - half, centre + shift + half
 
 
 def median_interval(
@@ -96,20 +112,29 @@ def median_interval(
 ) -> tuple[float, float, float]:
     """Return the median with its bootstrap interval, as `mean_interval`.
 
-    The interval is by percentiles: a median has too few different values for the correction's jackknife.
+    The interval is by percentiles: a median has too few different values for the correction's jackknife. Of
+    more than `MOST_RESAMPLED` values it is the one between two order statistics, by the binomial distribution
+    of the number of values below the median.
     """
-    return _bootstrap(values, np.median, "percentile", confidence)
+    sample = np.asarray(values, float)
+    if len(sample) <= MOST_RESAMPLED:
+        return _bootstrap(sample, np.median, "percentile", confidence)
+    from scipy.stats import binom
+
+    n = len(sample)
+    below = int(binom.ppf((1 - confidence) / 2, n, 0.5))
+    low, high = np.partition(sample, (below - 1, n - below))[[below - 1, n - below]]
+    return float(np.median(sample)), float(low), float(high)
 
 
 def _bootstrap(
-    values: Sequence[float] | FloatArray,
+    sample: FloatArray,
     statistic: Callable[..., Any],
     method: Literal["BCa", "percentile"],
     confidence: float,
 ) -> tuple[float, float, float]:
     from scipy.stats import bootstrap
 
-    sample = np.asarray(values, float)
     if not len(sample):
         return np.nan, np.nan, np.nan
     centre = float(statistic(sample))

@@ -1,17 +1,23 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
+from collections.abc import Callable
 from itertools import combinations, product
 
 import numpy as np
 import pytest
 
+from mpgrasp import statistics
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.geometry import FloatArray
 from mpgrasp.statistics import (
     FEWEST_PAIRS,
+    MOST_RESAMPLED,
     holm,
     mcnemar,
     mean_interval,
+    median_interval,
     restricted,
     smallest_p,
     wilcoxon,
@@ -115,3 +121,52 @@ def test_a_bootstrap_interval_is_the_same_every_time_and_needs_two_values() -> N
 def test_restricted_times_are_cut_off_at_the_limit() -> None:
     assert restricted([1.0, 5.0, 9.0], 6.0).tolist() == [1.0, 5.0, 6.0]
     assert restricted([1.0, 9.0], None).tolist() == [1.0, 9.0]
+
+
+SKEWED = np.random.default_rng(0).lognormal(0, 1, MOST_RESAMPLED)
+
+
+@pytest.mark.parametrize(("interval", "apart"), [(mean_interval, 0.03), (median_interval, 0.08)])
+def test_many_values_have_the_interval_that_resampling_gives(
+    interval: Callable[[FloatArray], tuple[float, float, float]],
+    apart: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    centre, *resampled = interval(SKEWED)
+    monkeypatch.setattr(statistics, "MOST_RESAMPLED", 10)
+    assert interval(SKEWED) == (
+        centre,
+        pytest.approx(resampled[0], abs=apart * (resampled[1] - resampled[0])),
+        pytest.approx(resampled[1], abs=apart * (resampled[1] - resampled[0])),
+    )
+
+
+@pytest.mark.parametrize(
+    ("interval", "truth"), [(mean_interval, 1.0), (median_interval, math.log(2))], ids=["mean", "median"]
+)
+def test_intervals_of_many_values_hold_the_truth_as_often_as_they_say(
+    interval: Callable[[FloatArray], tuple[float, float, float]], truth: float
+) -> None:
+    rng = np.random.default_rng(1)
+    held = 0
+    for _ in range(1000):
+        _, low, high = interval(rng.exponential(1.0, MOST_RESAMPLED + 1))
+        held += low <= truth <= high
+    assert 0.93 <= held / 1000 <= 0.97
+
+
+def test_many_equal_values_have_no_width() -> None:
+    same = np.full(MOST_RESAMPLED + 1, 7.0)
+    assert mean_interval(same) == median_interval(same) == (7.0, 7.0, 7.0)
+
+
+def test_a_million_values_take_little_memory() -> None:
+    values = np.random.default_rng(0).random(1_000_000)
+    tracemalloc.start()
+    try:
+        mean_interval(values)
+        median_interval(values)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 10 * values.nbytes
