@@ -21,6 +21,8 @@ examples:
   python -m mpgrasp.bench thin --set controller.gamma=4/3 --set sensor.subpixel=0.12
   python -m mpgrasp.bench sweep thin --set controller.gamma=0,4/3,8 --set controller.alpha=0.2,1
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
+  python -m mpgrasp.bench thin --episodes 1000 --shard 3/16 --out shards/3
+  python -m mpgrasp.bench merge shards/* --out thin-1000     (see merge --help)
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
@@ -125,6 +127,12 @@ def make_parser() -> argparse.ArgumentParser:
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
     add_settings(parser)
+    add(
+        "--shard",
+        metavar="K/N",
+        help="play every N-th episode alone, from the K-th on (1 to N), for runs on several machines; "
+        "`merge` puts the shards together",
+    )
     add("--seed", metavar="S", type=SEED, default=0, help="0, 1, 2, ... (default: 0)")
     add("--out", metavar="DIR", type=Path, help="folder of the results (default: runs/SUITE-time)")
     add(

@@ -97,6 +97,7 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         seed=plan.seed,
         camera=plan.camera,
         noise=plan.noise,
+        shard=None if plan.shard is None else str(plan.shard),
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Method, Task
@@ -30,6 +31,33 @@ def every_method(detectors: Sequence[str], controllers: Sequence[str]) -> tuple[
         if not names or not all(names) or len(set(names)) < len(names):
             raise ConfigError(f"unusable list of {kind}s", got=",".join(names), allowed=f"different {kind}s")
     return tuple(Method(detector, controller) for detector in detectors for controller in controllers)
+
+
+class Shard(NamedTuple):
+    """Every `of`-th episode of a run, with all of its methods, so that pairs of them stay together."""
+
+    number: int
+    """1 to `of`."""
+    of: int
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """Return the shard that a text such as 3/16 means; `str` makes the text of it.
+
+        Raises:
+            ConfigError: another text.
+        """
+        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+        if found is None or not 1 <= int(found[1]) <= int(found[2]):
+            raise ConfigError("unusable shard", got=text, allowed="K/N with K from 1 to N, such as 3/16")
+        return cls(int(found[1]), int(found[2]))
+
+    def has(self, episode: int) -> bool:
+        """True if an episode is one of the shard."""
+        return episode % self.of == self.number - 1
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.of}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +91,8 @@ class Plan:
     """Camera backend: auto, gl (rasterised) or ray (ray-cast, needs no OpenGL)."""
     noise: bool = True
     """True if the depth camera is as noisy as a real one."""
+    shard: Shard | None = None
+    """Part of the episodes that is played here; None for all."""
     record: int = 0
     """Number of episodes of each cell that are recorded, the first ones."""
     recordings: Path | None = None
@@ -84,6 +114,8 @@ class Plan:
         batch = max(self.batch(suite) for suite in self.suites)
         if self.until_ci is not None and self.max_episodes < batch:
             raise ConfigError("max-episodes out of range", got=self.max_episodes, allowed=f"{batch} or more")
+        if self.shard is not None:
+            self._check_shard(self.shard, batch)
         for name, choice, allowed in (
             ("camera backend", self.camera, BACKENDS), ("runtime", self.runtime, RUNTIMES),
         ):  # fmt: skip
@@ -94,6 +126,16 @@ class Plan:
                 raise ConfigError(
                     "weights for a detector that does not run", got=name, allowed=self.detectors
                 )
+
+    def _check_shard(self, shard: Shard, most: int) -> None:
+        if self.until_ci is not None:
+            raise ConfigError(
+                "--until-ci with --shard: a shard cannot know the others' results",
+                got=str(shard),
+                allowed="one of both",
+            )
+        if shard.number > most:
+            raise ConfigError("a shard without an episode", got=str(shard), allowed=f"K up to {most}")
 
     @property
     def detectors(self) -> tuple[str, ...]:
@@ -117,6 +159,11 @@ class Plan:
         """Episodes of each cell in a suite; with `until_ci` those that are added at a time."""
         return suite.trials if self.episodes is None else self.episodes
 
+    def has(self, suite: Suite, episode: int) -> bool:
+        """True if an episode is played in a suite, and here."""
+        most = self.batch(suite) if self.until_ci is None else self.max_episodes
+        return 0 <= episode < most and (self.shard is None or self.shard.has(episode))
+
     def place(self, task: Task) -> tuple[int, ...]:
         """Place of a task in the order of the plan: of two tasks, the one with the lesser place is first.
 
@@ -138,5 +185,8 @@ class Plan:
         compares its methods over the same episodes.
         """
         return [
-            Task(suite.name, episode, *method) for episode in range(start, stop) for method in self.methods
+            Task(suite.name, episode, *method)
+            for episode in range(start, stop)
+            if self.has(suite, episode)
+            for method in self.methods
         ]

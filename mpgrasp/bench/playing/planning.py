@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpgrasp.bench.analysis.paper import Baseline
-from mpgrasp.bench.playing.plan import Plan, every_method
+from mpgrasp.bench.playing.plan import Plan, Shard, every_method
 from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.playing.sweep import Layout, lay_out
 from mpgrasp.bench.record import Method
@@ -79,6 +79,7 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         seed=arguments.seed,
         camera=arguments.camera,
         noise=not arguments.no_noise,
+        shard=None if arguments.shard is None else Shard.parse(arguments.shard),
         record=arguments.record,
         recordings=out / "recordings",
         traces=out / "traces",

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
-from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
+from mpgrasp.bench.analysis.summary import summarise
+from mpgrasp.bench.playing.conclusion import EXIT_BROKEN, conclude
 from mpgrasp.bench.playing.crew import Crew, make_crew
 from mpgrasp.bench.playing.description import describe
 from mpgrasp.bench.playing.patience import Patience
@@ -14,16 +14,12 @@ from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.planning import make_plan
 from mpgrasp.bench.playing.player import EpisodeError, Player
 from mpgrasp.bench.record import Line, Task, played
-from mpgrasp.bench.report.sweep import sweep_table
-from mpgrasp.bench.report.terminal import RunProgress, print_report_table, print_table, print_tests
-from mpgrasp.bench.results.trace import prune_traces
+from mpgrasp.bench.report.terminal import RunProgress
 from mpgrasp.bench.results.writer import RunDirectory
-from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED, print_error
+from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.processes import interrupts_wait
 from mpgrasp.suite import Suite, episode_seed
-
-EXIT_BROKEN = 1
 
 
 def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
@@ -74,7 +70,8 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
             progress.note(f"error: {error}; the finished episodes are kept")
             code = EXIT_BAD_INPUT
     with interrupts_wait():
-        return _conclude(plan, directory, finished) or code
+        lines = sorted(directory.episodes(), key=lambda line: plan.place(line.task))
+        return conclude(directory, lines, finished=finished, sweep=plan.sweep) or code
 
 
 def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: RunProgress) -> bool:
@@ -125,9 +122,8 @@ def _refuse_others(plan: Plan, directory: RunDirectory, lines: Sequence[Line]) -
     for line in lines:
         suite, method = suites.get(line.suite), line.task.cell.method
         if suite is not None and method in plan.methods and line.seed == plan.seed:
-            limit = plan.batch(suite) if plan.until_ci is None else plan.max_episodes
-            world = episode_seed(line.suite, line.seed, line.episode) if 0 <= line.episode < limit else None
-            if line.scene_seed == world:
+            there = plan.has(suite, line.episode)
+            if there and line.scene_seed == episode_seed(line.suite, line.seed, line.episode):
                 continue
         raise OutputError(
             f"a line of {directory.episodes_file.name} is of no episode of this run",
@@ -142,38 +138,3 @@ def _narrow(plan: Plan, suite: Suite, lines: Sequence[Line], stop: int) -> bool:
     cells = summarise(line for line in lines if line.suite == suite.name and line.episode < stop)
     widths = [100 * (cell.wilson_high - cell.wilson_low) for cell in cells]
     return len(widths) == len(plan.methods) and max(widths) < plan.until_ci
-
-
-def _conclude(plan: Plan, directory: RunDirectory, finished: bool) -> int:
-    """Put the lines in order, write and print what they add up to; the exit code that follows from it."""
-    from mpgrasp.bench.report.build import write_report
-
-    code = 0
-    lines = sorted(directory.episodes(), key=lambda line: plan.place(line.task))
-    cells, tests = summarise(lines), paired_tests(lines)
-    errors = sum(cell.errors for cell in cells)
-    try:
-        directory.settle(lines)
-        directory.write_summary(
-            RunSummary(complete=finished and not errors, cells=tuple(cells), paired_tests=tuple(tests))
-        )
-        prune_traces(directory.path / "traces")
-        write_report([directory.path], directory.path)
-    except OutputError as error:
-        print_error(error)
-        code = EXIT_BAD_INPUT
-    finally:
-        directory.close()
-    print_table(cells)
-    print_tests(tests)
-    if plan.sweep and cells:
-        print_report_table(sweep_table(plan.sweep, lines))
-    print(f"Results: {directory.path}")
-    if errors:
-        print(
-            f"mpgrasp: {errors} episodes could not be played, see {directory.path / 'errors'}; "
-            f"--resume {directory.path} tries them again",
-            file=sys.stderr,
-        )
-        code = code or EXIT_BROKEN
-    return code

@@ -102,6 +102,8 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     camera: str
     """Camera backend that was asked for."""
     noise: bool
+    shard: str | None = None
+    """Part of the run that was played, as "3/16"; None for all of it."""
 
     def __post_init__(self) -> None:
         alone = isinstance(self.suite, SuiteCard)
