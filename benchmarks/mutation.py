@@ -219,11 +219,9 @@ def _study(command: Sequence[str]) -> None:
         raise ConfigError("cosmic-ray is not installed", allowed="pip install cosmic-ray")
     prepare(options.out)
     told = about("mutation", command, sample=options.sample, seed=options.seed, tests=TESTS)
-    why = reasons()
-    rows = [
-        {**row, "reason": why.get((row["module"], row["code"], row["changed"]), "")}
-        for row in play(modules, options.sample, options.seed, options.out)
-    ]
+    played = list(play(modules, options.sample, options.seed, options.out))
+    why = reasons()  # they may be written while the study lasts: survivors show in `parts/`
+    rows = [{**row, "reason": why.get((row["module"], row["code"], row["changed"]), "")} for row in played]
     shares = by_module(rows)
     survivors = [row for row in rows if not row["killed"]]
     publish(options.out, "mutation", told, {"killed": shares, "survivors": survivors}, rows, draw(shares))

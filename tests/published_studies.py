@@ -174,3 +174,57 @@ def factor_rate(thickness: float, **levels: int) -> tuple[int, int]:
 def _factor_episodes() -> list[dict[str, str]]:
     with (RESULTS / "controller-factors" / "episodes.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+# what goes wrong, and what the tests notice
+KINDS = {
+    "meshes": "mesh",
+    "weight files": "weights",
+    "command lines": "command",
+    "plug-ins, refused when loaded": "plug-in, found out by loader",
+    "plug-ins, in a run": "plug-in, found out by guard",
+    "plug-ins, by the kit": "plug-in, found out by kit",
+    "processes killed by SIGKILL": "SIGKILL",
+    "disks too small": "full disk",
+    "pairs of equal runs": "equal runs",
+}
+"""Kinds of trials of the study of reliability, by their names in docs/results.md."""
+
+
+def trials(kind: str, column: str) -> float:
+    """Return a cell of the table of what goes wrong."""
+    rows = [row for row in table_of("reliability") if row["kind"] == KINDS[kind]]
+    return {
+        "trials": float(len(rows)),
+        "as it must be": float(sum(not row["fault"] for row in rows)),
+        "slowest, s": max(float(row["seconds"]) for row in rows),
+    }[column]
+
+
+def minutes_of_trials() -> float:
+    """Return the sum of the times of all trials [min]; bad input is played two at a time."""
+    rows = table_of("reliability")
+    halves = {"equal runs": 1.0, "SIGKILL": 1.0, "full disk": 1.0}
+    return sum(float(row["seconds"]) * halves.get(row["kind"], 0.5) for row in rows) / 60
+
+
+def mutants(module: str, column: str) -> Any:
+    """Return a cell of the table of mutants."""
+    name = module.strip("`")
+    rows = [row for row in table_of("mutation") if name in ("all", row["module"])]
+    killed = sum(row["killed"] == "True" for row in rows)
+    return share(killed, len(rows)) if column == "killed %" else len(rows)
+
+
+def survivors(reason: str = "") -> int:
+    """Return the number of mutants that survived, for a reason that contains these words."""
+    return sum(row["killed"] == "False" and reason in row["reason"] for row in table_of("mutation"))
+
+
+def bits(setting: str, column: str) -> Any:
+    """Return a cell of the table of settings that may change bits."""
+    row = entry(study("same-bits")["rows"], setting=setting.split("`")[1])
+    if column == "n":
+        return row["n"]
+    key = {"equal %": "equal", "other outcome %": "other_outcome", "other success %": "other_success"}[column]
+    return share(row[key]["count"], row["n"])
