@@ -24,7 +24,7 @@ from bad_meshes import BAD_MESHES, BadMesh
 from bad_plug_ins import BAD_PLUG_INS, BadPlugIn
 from bad_weights import BAD_WEIGHTS, BadWeights
 
-from mpgrasp.bench.playing.patience import ALIKE
+from mpgrasp.bench.playing.patience import ALIKE, FIRST
 from mpgrasp.foreign_code import LIMIT_VARIABLE
 
 LIMIT = 60.0
@@ -199,7 +199,8 @@ def ended_by_errors(folder: Path, _: Ended) -> str:
     """What is wrong with a run that a plug-in's errors should have ended, with a row for each."""
     lines = (folder / "run" / "episodes.jsonl").read_text(encoding="utf-8").splitlines()
     errors = sum(json.loads(line)["outcome"] == "error" for line in lines)
-    return "" if errors == ALIKE else f"{errors} error rows of {len(lines)} in place of {ALIKE}"
+    # one more may have been in hand when the run ended
+    return "" if ALIKE <= errors <= FIRST else f"{errors} error rows of {len(lines)} in place of {ALIKE}"
 
 
 def found_out(said: str) -> Callable[[Path, Ended], str]:
