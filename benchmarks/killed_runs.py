@@ -55,7 +55,8 @@ class Killed:
             run_number += 1
             strikes: list[dict[str, object]] = []
             while len(rows) + len(strikes) < times and not (out / _SUMMARY).is_file():
-                strikes.append(self._strike(out, rng.uniform(0, self.longest), len(rows) + len(strikes)))
+                struck = self._strike(out, rng.uniform(0, self.longest), len(rows) + len(strikes))
+                strikes += [struck] if struck else []
             ended = self.bench.play(self._next(out))
             fault = fault_at_end(ended) or different(out, self.whole) or self._summaries(out)
             if strikes and not strikes[-1]["fault"]:
@@ -70,7 +71,8 @@ class Killed:
         same = (out / _SUMMARY).read_bytes() == (self.whole / _SUMMARY).read_bytes()
         return "" if same else "another summary"
 
-    def _strike(self, out: Path, after: float, number: int) -> dict[str, object]:
+    def _strike(self, out: Path, after: float, number: int) -> dict[str, object] | None:
+        """Begin the run, or go on with it, and kill it after a time [s]; None if it had ended by then."""
         before = _whole_lines(out)
         environment = {**os.environ, "MPGRASP_CACHE": str(self.bench.cache)}
         with (self.bench.folder / "said").open("wb") as said:
@@ -88,6 +90,8 @@ class Killed:
             except subprocess.TimeoutExpired:
                 process.kill()
             process.wait()
+        if process.returncode != -signal.SIGKILL:
+            return None
         fault = _left_alive(process.pid)
         lines = _whole_lines(out)
         if not fault and not set(before) <= set(lines):  # a run that ends puts them into its order
