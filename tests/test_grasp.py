@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,11 +108,17 @@ def test_the_grasp_frame_closes_along_the_grasp_angle_and_approaches_downwards()
         np.testing.assert_allclose(np.cross(T[:3, 1], T[:3, 2]), T[:3, 0], atol=1e-12)
 
 
-def test_a_map_of_the_wrong_size_is_refused() -> None:
+@pytest.mark.parametrize("wrong", [np.s_[:-1], np.s_[:, :-1], np.s_[None]], ids=["rows", "columns", "axes"])
+def test_a_map_of_the_wrong_size_is_refused(wrong: Any) -> None:
     view = random_map(0.0, np.random.default_rng(2))
+    for quality in (view.quality.T, view.quality[wrong]):
+        refused_map(view, quality)
+
+
+def refused_map(view: GraspMap, quality: Any) -> None:
     with pytest.raises(ConfigError, match="quality"):
         GraspMap(
-            quality=view.quality.T,
+            quality=quality,
             angle=view.angle,
             width=view.width,
             depth=view.depth,

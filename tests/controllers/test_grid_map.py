@@ -88,6 +88,17 @@ def test_mean_quality_of_a_robust_cell_is_the_mean_of_bin_centres() -> None:
     assert grid.mean_quality().sum() == pytest.approx(grid.mean_quality()[cell])
 
 
+def test_the_mean_angle_of_any_direction_is_it_and_of_two_lies_halfway() -> None:
+    for angle in np.linspace(-1.5, 1.5, 13):
+        grid = GridMap(SMALL)
+        for off in (0.0, 0.4, 0.2):  # the first alone, then with another, then with the one between them
+            grid.update(one_point(0.9, float(wrap_half_pi(angle + off)), (0.5, 0.0)))
+            cell = cell_at(grid, 0.5, 0.0)
+            middle = angle if off == 0.0 else angle + 0.2
+            # half a bin of 10 degrees at most for each
+            assert line_angle_difference(grid.mean_angle(cell), middle) < np.deg2rad(5.01)
+
+
 def test_the_mean_angle_across_the_wrap_is_the_wrap_and_not_zero() -> None:
     grid = GridMap(SMALL)
     for angle in np.deg2rad([-84, 84, -89, 89]):
