@@ -27,7 +27,6 @@ RUNGS: dict[str, tuple[str, str | None]] = {
     "single": ("oracle/single", None),
 }
 """Runs of the oracle by the rung's name in docs/results.md, and the suite in them where there are several."""
-PARTS, BY_MEAN = "controller-parts/stacked", "benchmarks.controller_parts:MppcByMean"
 TIME_LIMIT = 900.0
 """Simulated time that a table which was not cleared counts as [s]."""
 
@@ -87,6 +86,16 @@ def success(run: str, detector: str, controller: str, suite: str | None = None) 
     return share(sum(line["success"] for line in lines), len(lines))
 
 
+def robust_range(run: str) -> tuple[float, float]:
+    """Return the lowest and the highest rate of the cells of a run with a robust controller [%]."""
+    rates = [
+        100 * mean(line["success"] for line in lines.values())
+        for (_, _, controller), lines in cells(run).items()
+        if controller.endswith("_robust")
+    ]
+    return min(rates), max(rates)
+
+
 def success_range(run: str) -> tuple[float, float]:
     """Return the lowest and the highest rate of all cells of a run [%]."""
     rates = [100 * mean(line["success"] for line in lines.values()) for lines in cells(run).values()]
@@ -125,13 +134,13 @@ def played(detector: str, controller: str, column: str) -> Share | None:
     return None
 
 
-def failed(run: str, detector: str, controller: str) -> list[Line]:
-    return [line for line in cell(run, detector, controller).values() if not line["success"]]
+def failed(run: str, detector: str, controller: str, suite: str | None = None) -> list[Line]:
+    return [line for line in cell(run, detector, controller, suite).values() if not line["success"]]
 
 
 def failures(run: str, detector: str, controller: str, **wanted: str) -> int:
-    """Return the number of failures of a cell, by `outcome` or `object` where given."""
-    lines = failed(run, detector, controller)
+    """Return the number of failures of a cell, by `suite`, `outcome` or `object` where given."""
+    lines = failed(run, detector, controller, wanted.get("suite"))
     return sum(all(line[key] == value for key, value in wanted.items()) for line in lines)
 
 
@@ -155,17 +164,9 @@ def largest_p_of_pairs(run: str, detector: str, controller: str) -> float:
     return max(float(test["p_holm"]) for test in summary["paired_tests"] if method in (test["a"], test["b"]))
 
 
-def same_outcomes(run: str, other: str) -> tuple[int, int]:
-    """Return how many episodes of a run of one cell end as in the other run, and how many there are."""
-    ((suite, detector, controller),) = cells(run)
-    ours, theirs = cell(run, detector, controller), cell(other, detector, controller, suite)
-    assert ours.keys() == theirs.keys()
-    return sum(line["outcome"] == theirs[k]["outcome"] for k, line in ours.items()), len(ours)
-
-
-def share_of_inference(run: str, detector: str, controller: str) -> float:
+def share_of_inference(run: str, detector: str, controller: str, suite: str | None = None) -> float:
     """Return the share of a control tick that the detector takes [%], of the mean times over all episodes."""
-    times = [line["timing"] for line in cell(run, detector, controller).values()]
+    times = [line["timing"] for line in cell(run, detector, controller, suite).values()]
     return 100 * float(sum(t["detect"] for t in times) / sum(sum(t.values()) for t in times))
 
 
@@ -268,64 +269,62 @@ def _restricted(lines: Cell) -> dict[int, float]:
     }
 
 
-def _more(run: str, method: Method, other: Method, other_run: str | None) -> list[float]:
-    ours, theirs = _restricted(cell(run, *method)), _restricted(cell(other_run or run, *other))
+def _more(run: str, method: Method, other: Method) -> list[float]:
+    ours, theirs = _restricted(cell(run, *method)), _restricted(cell(run, *other))
     assert ours.keys() == theirs.keys()
     return [ours[k] - theirs[k] for k in ours]
 
 
-def seconds_more(run: str, method: Method, other: Method, other_run: str | None = None) -> float:
+def seconds_more(run: str, method: Method, other: Method) -> float:
     """Return how much longer one method takes than another, mean over common tables [s]."""
-    return mean(_more(run, method, other, other_run))
+    return mean(_more(run, method, other))
 
 
-def p_of_times(run: str, method: Method, other: Method, other_run: str | None = None) -> float:
-    return float(wilcoxon(_more(run, method, other, other_run)).pvalue)
+def p_of_times(run: str, method: Method, other: Method) -> float:
+    return float(wilcoxon(_more(run, method, other)).pvalue)
 
 
 def failed_picks(run: str, detector: str, controller: str) -> int:
     return sum(sum(line["failures"].values()) for line in cell(run, detector, controller).values())
 
 
-def first_picks(run: str, detector: str, controller: str) -> int:
-    """Return the number of tables whose first pick succeeded."""
-    return sum(line["picks"][0]["outcome"] == "success" for line in cell(run, detector, controller).values())
+def attempts(run: str, detector: str, controller: str, suite: str | None = None) -> list[dict[str, Any]]:
+    """Return all episodes of one grasp, or all picks of all tables."""
+    lines = cell(run, detector, controller, suite).values()
+    return [attempt for line in lines for attempt in line.get("picks", [line])]
 
 
-def attempts(run: str, detector: str, controller: str) -> list[dict[str, Any]]:
-    """Return all picks of all tables."""
-    return [pick for line in cell(run, detector, controller).values() for pick in line["picks"]]
-
-
-def grasps_where_next_to_nothing_was_seen(run: str, detector: str, controller: str) -> tuple[int, int]:
+def grasps_where_next_to_nothing_was_seen(
+    run: str, detector: str, controller: str, suite: str | None = None
+) -> tuple[int, int]:
     """Return the grasps at a cell with one count in the lowest of 10 bins beside the prior, and all grasps.
 
     The prior is one count in each of 18 x 10 bins, whose mean is 0.5.
     """
     once = (18 * 10 * 0.5 + 0.05) / (18 * 10 + 1)
-    claimed = [pick["grasp"]["quality"] for pick in attempts(run, detector, controller) if pick["grasp"]]
+    claimed = [
+        attempt["grasp"]["quality"]
+        for attempt in attempts(run, detector, controller, suite)
+        if attempt["grasp"]
+    ]
     return sum(abs(quality - once) < 1e-6 for quality in claimed), len(claimed)
+
+
+def paper_trials(detector: str, controller: str, column: str) -> Any:
+    """Return a cell of the table of the paper's trials with one grasp."""
+    name, how, run = NAMES[detector], controller.strip("`"), "single-unseen-thin"
+    if column.endswith("%"):
+        return success(run, name, how, column.removesuffix(" %"))
+    if column == "stops":
+        return sum(line["reflex"] is not None for line in attempts(run, name, how, "single"))
+    assert column == "grasps of an empty cell"
+    return grasps_where_next_to_nothing_was_seen(run, name, how, "single")
 
 
 def singular_stops(run: str, detector: str, controller: str) -> tuple[int, int]:
     """Return the stops of a reach after a singular value below 0.05, and all of them."""
     stopped = [pick for pick in attempts(run, detector, controller) if pick["reflex"]]
     return sum(pick["min_singular_value"] < 0.05 for pick in stopped), len(stopped)
-
-
-def peaks_at_first_look(run: str) -> float:
-    """Return the share of picks whose first view had a peak [%], over networks in closed loop."""
-    picks = [
-        pick
-        for (_, detector, controller), lines in cells(run).items()
-        if detector != "oracle" and controller != "open_loop"
-        for line in lines.values()
-        for pick in line["picks"]
-    ]
-    return 100 * float(mean(pick["first_detection_s"] == 0 for pick in picks))
-
-
-# sticks in closed loop
 
 
 def _drifts(detector: str, controller: str) -> dict[int, float]:
@@ -374,15 +373,20 @@ def orderings() -> dict[tuple[str, str], dict[str, str]]:
     return {(row["suite"], row["claim"]): row for row in found}
 
 
-def ordering(suite: str, claim: str) -> float:
-    """Return p of a claim, corrected after Holm over all of them."""
-    return float(orderings()[suite, claim]["Holm p"])
+def ordering(suite: str, claim: str, baseline: str = "published") -> float:
+    """Return p of a claim, corrected after Holm over all of them that were tested with a baseline."""
+    return float(orderings()[suite, claim][f"Holm p, {baseline}"])
 
 
-def verdicts(verdict: str) -> int:
-    return sum(row["verdict"] == verdict for row in orderings().values())
+def verdicts(verdict: str, baseline: str, suite: str | None = None) -> int:
+    """Return the number of claims with a verdict, of one suite or of all."""
+    return sum(
+        row[f"verdict, {baseline}"] == verdict
+        for (name, _), row in orderings().items()
+        if suite in (None, name)
+    )
 
 
-def verdicts_in(verdict: str, column: str) -> int | None:
-    """Return the number of orderings with a verdict; None for a baseline that has not been played."""
-    return verdicts(verdict) if column == "older pair" else None
+def verdicts_in(verdict: str, column: str) -> int:
+    """Return a cell of the table of verdicts."""
+    return verdicts(verdict, column.partition(":")[0])

@@ -20,7 +20,8 @@ import pytest
 import table
 from bench_runs import grasp_row
 
-from mpgrasp.bench.analysis.hypotheses import Verdict, count_verdicts, evaluate
+from mpgrasp.bench.analysis.hypotheses import count_verdicts, evaluate
+from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import RunSummary, summarise
 from mpgrasp.bench.record import by_cell, line_of
 from mpgrasp.bench.results.reader import read_lines
@@ -212,11 +213,11 @@ def test_a_cell_that_two_published_runs_have_played_is_refused(
         table.table(paper=True)
 
 
-def test_the_report_on_the_paper_says_what_follows_from_the_episodes() -> None:
-    runs = ("single", "unseen-thin", "stacked")
+@pytest.mark.parametrize("baseline", Baseline)
+def test_the_report_on_the_paper_says_what_follows_from_the_episodes(baseline: Baseline) -> None:
+    runs = ("single-unseen-thin", "stacks/dhrnet", "stacks/tfgrasp", "stacks/ggcnn")
     lines = [line for run in runs for line in read_lines(published_runs.RESULTS / run).lines]
-    findings = evaluate(by_cell(lines))
+    findings = evaluate(by_cell(lines), baseline=baseline)
     assert len(findings) == len(published_runs.orderings())
     for verdict, n in count_verdicts(findings).items():
-        if verdict is not Verdict.ABSENT:
-            assert published_runs.verdicts(verdict) == n
+        assert published_runs.verdicts(str(verdict), str(baseline)) == n

@@ -33,8 +33,6 @@ STALE = {
     "ablation-fusion": _MODIFIED,
     "run-time": _MODIFIED,
     "thickness": _MODIFIED,
-    "unseen-thin": _MODIFIED,
-    "without-gl/thin-dhrnet-mppc": _MODIFIED,
 }
 """Runs that no commit tells exactly, with the reason why they are still published."""
 
