@@ -201,13 +201,6 @@ def trials(kind: str, column: str) -> float:
     }[column]
 
 
-def ended_before_the_kill() -> int:
-    """Return the number of processes that were to be killed and had ended by then."""
-    rows = [row for row in table_of("reliability") if row["kind"] == "SIGKILL"]
-    after = [float(row["name"].partition("after ")[2].partition(" s")[0]) for row in rows]
-    return sum(float(row["seconds"]) < moment for row, moment in zip(rows, after, strict=True))
-
-
 def minutes_of_trials() -> float:
     """Return the sum of the times of all trials [min]; bad input is played two at a time."""
     rows = table_of("reliability")
