@@ -37,7 +37,7 @@ _LOAD_LIMIT = "5"
 
 @dataclass(frozen=True, kw_only=True)
 class Ended:
-    """What came of a process."""
+    """A process that has ended, or was ended."""
 
     code: int | None
     """Exit code; None if it was still at work after its limit."""
@@ -92,7 +92,7 @@ def run(argv: Sequence[str], folder: Path, environment: Mapping[str, str], limit
 
 
 def fault_of(trial: Trial, ended: Ended) -> str:
-    """What is wrong with the way in which a process has ended; "" if nothing is."""
+    """Return what is wrong with the way in which a process has ended; "" if nothing is."""
     if ended.code is None:
         return f"still at work after {trial.limit:g} s"
     if "Traceback (most recent call last)" in ended.out + ended.err:
@@ -196,7 +196,7 @@ def plug_in_trial(name: str, bad: BadPlugIn) -> Trial:
 
 
 def ended_by_errors(folder: Path, _: Ended) -> str:
-    """What is wrong with a run that a plug-in's errors should have ended, with a row for each."""
+    """Return what is wrong with a run that a plug-in's errors should have ended, with a row for each."""
     lines = (folder / "run" / "episodes.jsonl").read_text(encoding="utf-8").splitlines()
     errors = sum(json.loads(line)["outcome"] == "error" for line in lines)
     # one more may have been in hand when the run ended

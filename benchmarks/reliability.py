@@ -79,7 +79,7 @@ def draw(rows: Sequence[Row]) -> Figure:
 
 
 def parts(options: Any, work: Path) -> dict[str, Make]:
-    """What there is to play, by name: functions that return rows."""
+    """All that there is to play, by name: functions that return rows."""
     bench = Bench(work, work / "cache")
     rng = random.Random(options.seed)
 

@@ -90,10 +90,12 @@ class SmallDisk:
         begun = (left / RUN).is_file()
         words = ["--resume", str(left)] if begun else [*self.words, "--out", str(left)]
         ended = self.bench.play(words)
-        lost = [line for line in before if line not in results(left)] if not fault_at_end(ended) else []
+        if fault := fault_at_end(ended):
+            return fault
+        lost = set(before) - set(results(left))  # error rows are tried again
         if any('"outcome": "error"' not in line for line in lost):
             return "finished episodes are lost"
-        return fault_at_end(ended) or different(left, self.whole)
+        return different(left, self.whole)
 
 
 def holds_the_same(path: Path, whole: Path) -> bool:
@@ -117,7 +119,7 @@ def _content(path: Path) -> object:
 
 
 def small_disks_here(folder: Path) -> str:
-    """Why no small disk can be mounted here; "" if one can."""
+    """Return why no small disk can be mounted here; "" if one can."""
     try:
         ended = run(
             ["unshare", "-rm", "mount", "-t", "tmpfs", "-o", "size=4096", "none", str(folder)],

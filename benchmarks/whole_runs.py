@@ -31,7 +31,7 @@ def results(folder: Path) -> list[str]:
 
 
 def different(one: Path, other: Path) -> str:
-    """What differs in the results of two runs; "" if nothing does."""
+    """Return what differs in the results of two runs; "" if nothing does."""
     a, b = results(one), results(other)
     if a != b:
         return f"{len(set(a) - set(b))} of {len(a)} lines differ"
@@ -39,7 +39,7 @@ def different(one: Path, other: Path) -> str:
 
 
 def fault_at_end(ended: Ended, codes: Sequence[int] = (0,)) -> str:
-    """What is wrong with the end of a command; "" if nothing is."""
+    """Return what is wrong with the end of a command; "" if nothing is."""
     if ended.code is None:
         return f"still at work after {ended.seconds:.0f} s"
     if "Traceback (most recent call last)" in ended.out + ended.err:
@@ -51,7 +51,7 @@ def fault_at_end(ended: Ended, codes: Sequence[int] = (0,)) -> str:
 
 @dataclass(frozen=True)
 class Bench:
-    """Where real runs are played; `cache` holds what networks were compiled to."""
+    """A folder in which real runs are played; `cache` holds what networks were compiled to."""
 
     folder: Path
     cache: Path

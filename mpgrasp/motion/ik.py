@@ -59,7 +59,8 @@ class DifferentialIK:
             mink.VelocityLimit(self.model, dict(zip(names, self._dq_max, strict=True))),
         ]
         self._pairs = panda.collision_pairs(self.model) if self.config.collisions else []
-        self._clearance = Clearance(self.model, self._geom_pairs(), self.config.collision_range)
+        self._geoms = self._geom_pairs()
+        self._clearance = Clearance(self.model, self._geoms, self.config.collision_range)
         self._swing = np.zeros(7)
 
     def reset(self) -> None:
@@ -243,15 +244,12 @@ class DifferentialIK:
         """Least distance [m] within the pairs that must not collide, at the last pose; inf beyond
         `collision_range`.
         """
-        if not self._pairs:
-            return np.inf
-        limit = next(iter(self._collision_limits.values()), None)
-        if limit is None:
+        if not self._geoms:
             return np.inf
         reach = self.config.collision_range
         least = min(
             mujoco.mj_geomDistance(self.model, self.configuration.data, a, b, reach, None)
-            for a, b in limit.geom_id_pairs
+            for a, b in self._geoms
         )
         return float(least) if least < reach else np.inf
 

@@ -89,7 +89,15 @@ def nearest(ik: DifferentialIK, q: FloatArray) -> float:
     data = mujoco.MjData(ik.model)
     data.qpos[:] = q
     mujoco.mj_kinematics(ik.model, data)
-    return min(float(mujoco.mj_geomDistance(ik.model, data, a, b, 1.0, None)) for a, b in ik._geom_pairs())
+    return min(float(mujoco.mj_geomDistance(ik.model, data, a, b, 1.0, None)) for a, b in ik._geoms)
+
+
+def test_the_clearance_is_measured_though_the_program_was_never_asked() -> None:
+    ik = DifferentialIK(IkConfig(collision_range=0.3))
+    for q in postures(ik, 60):
+        ik.pose(q)
+        distance = nearest(ik, q)
+        assert ik.clearance() == (pytest.approx(distance, abs=1e-9) if distance < 0.3 else np.inf)
 
 
 def test_no_distance_changes_faster_than_the_lever_says() -> None:
@@ -104,7 +112,7 @@ def test_no_distance_changes_faster_than_the_lever_says() -> None:
 def test_clearance_is_ample_exactly_where_nothing_is_near_or_is_measured() -> None:
     ik = DifferentialIK()
     near = 0.12
-    watch = Clearance(ik.model, ik._geom_pairs(), near)
+    watch = Clearance(ik.model, ik._geoms, near)
     rng = np.random.default_rng(2)
     q = np.array(panda.Q_HOME)
     told = []

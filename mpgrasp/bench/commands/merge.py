@@ -15,7 +15,7 @@ import msgspec
 from mpgrasp.bench.playing.conclusion import conclude
 from mpgrasp.bench.playing.plan import Shard
 from mpgrasp.bench.record import Line, Method, Task
-from mpgrasp.bench.results.reader import read_run
+from mpgrasp.bench.results.reader import RUN, read_run
 from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescription
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import Parser
@@ -99,6 +99,13 @@ def main(command: Sequence[str]) -> int:
             finished=not missing,
             sweep=run.configuration.sweep,
         )
+    others = sum(entry.made_with is not None for entry in run.resumed)
+    if others:
+        print(
+            f"mpgrasp: note: {others} of the parts were made with other versions or on other machines "
+            f"than the first, see `resumed` in {arguments.out / RUN}",
+            file=sys.stderr,
+        )
     if missing:
         print(
             f"mpgrasp: {missing} of {len(tasks)} episodes are missing; --resume {arguments.out} plays them",
@@ -150,7 +157,7 @@ def _whole(configuration: Configuration) -> Configuration:
 
 
 def merged(parts: Sequence[Part], out: Path) -> RunDescription:
-    """What run.json says of the whole: a command without shard, and what other machines made it with."""
+    """Return the whole's run.json: a command without shard, and what other machines made it with."""
     first = parts[0].about
     others = [
         Resumption(

@@ -91,11 +91,14 @@ def test_tracebacks_come_along(fake_world: pytest.MonkeyPatch, tmp_path: Path) -
     assert all("ZeroDivisionError" in (out / row["traceback"]).read_text() for row in errors)
 
 
-def test_other_machines_are_told_in_run_json(shards: list[Path], tmp_path: Path) -> None:
+def test_other_machines_are_told_in_run_json(
+    shards: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     about = json.loads((shards[1] / "run.json").read_text())
     about["made_with"]["platform"] = "Another"
     (shards[1] / "run.json").write_text(json.dumps(about))
     merge(shards, tmp_path / "merged")
+    assert "note: 1 of the parts were made with other versions" in capsys.readouterr().err
     run = read_run(tmp_path / "merged")
     assert [entry.made_with and entry.made_with.platform for entry in run.resumed] == ["Another", None]
     assert "--shard" not in run.command
