@@ -260,6 +260,15 @@ def p_against_none(error: str, suite: str) -> float:
     return float(binomtest(ours, ours + theirs, 0.5).pvalue) if ours + theirs else 1.0
 
 
+def real_cell_ends(error: str, outcome: str) -> tuple[int, int]:
+    """Return how many episodes with an error ended so, and how many there are, both suites together."""
+    lines = [
+        line for suite in ("unseen", "thin")
+        for line in cell(REAL_CELL + error, "dhrnet", "mppc", suite).values()
+    ]  # fmt: skip
+    return sum(line["outcome"] == outcome for line in lines), len(lines)
+
+
 # clearing tables
 
 
