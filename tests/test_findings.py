@@ -23,8 +23,9 @@ from bench_runs import grasp_row
 from mpgrasp.bench.analysis.hypotheses import count_verdicts, evaluate
 from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import RunSummary, summarise
-from mpgrasp.bench.record import by_cell, line_of
+from mpgrasp.bench.record import line_of
 from mpgrasp.bench.results.reader import read_lines
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.exceptions import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent

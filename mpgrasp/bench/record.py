@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterable, Mapping
-from typing import Any, Final, Literal, NamedTuple, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypeVar
 
 import msgspec
 
@@ -22,6 +22,8 @@ ERROR: Final = "error"
 """`outcome` of an episode that could not be played: it is no failure of a grasp, and is counted apart."""
 
 Row = TypeVar("Row", bound="Record")
+Number = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+"""A whole number from 0 that fits into 63 bits."""
 
 
 _LONGEST = 80  # characters of a point of a sweep in the name of a file
@@ -159,9 +161,9 @@ class GraspLine(Reach, frozen=True, kw_only=True):
     """Line of an episode with one grasp."""
 
     suite: str
-    seed: int
-    scene_seed: int
-    episode: int
+    seed: Number
+    scene_seed: Number
+    episode: Number
     detector: str
     controller: str
     timing: dict[str, float | None]
@@ -200,9 +202,9 @@ class ErrorLine(Record, frozen=True, kw_only=True):
     """Line of an episode that could not be played."""
 
     suite: str
-    seed: int
-    scene_seed: int
-    episode: int
+    seed: Number
+    scene_seed: Number
+    episode: Number
     detector: str
     controller: str
     outcome: Literal["error"] = ERROR
@@ -220,7 +222,7 @@ class ErrorLine(Record, frozen=True, kw_only=True):
 
 PlayedLine = GraspLine | ClearingLine
 Line = PlayedLine | ErrorLine
-Cells = dict[Cell, list[Line]]
+Cells = dict[Cell, Sequence[Line]]
 
 
 def line_of(row: Mapping[str, Any]) -> Line:
@@ -251,14 +253,6 @@ def text_of(line: Line) -> str:
     return one_line(line.as_row())
 
 
-def played(lines: Iterable[Line]) -> list[PlayedLine]:
+def played(lines: Iterable[Line]) -> Iterator[PlayedLine]:
     """Lines of episodes that were played, be it without success."""
-    return [line for line in lines if not isinstance(line, ErrorLine)]
-
-
-def by_cell(lines: Iterable[Line]) -> Cells:
-    """Lines by cell, in order of first appearance."""
-    cells: Cells = {}
-    for line in lines:
-        cells.setdefault(line.task.cell, []).append(line)
-    return cells
+    return (line for line in lines if not isinstance(line, ErrorLine))

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
-def replace_file(file: Path, content: str | bytes) -> None:
+def replace_file(file: Path, content: str | bytes | Iterable[str]) -> None:
     """Write a file, or put new content in the place of what is there; it is on the disk on return.
 
     Args:
         file: in a folder that exists.
-        content: all of it; text is written as UTF-8, parts of file names that have no form in it escaped.
+        content: all of it, or pieces of it; text is written as UTF-8, parts of file names that have no form
+            in it escaped.
 
     Raises:
         OSError: it cannot be written. What was there before is still there, and nothing else is.
     """
     with replacing(file) as temporary, temporary.open("xb") as stream:
-        stream.write(content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace"))
+        for piece in (content,) if isinstance(content, str | bytes) else content:
+            stream.write(piece if isinstance(piece, bytes) else piece.encode("utf-8", "backslashreplace"))
 
 
 @contextmanager

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from bench_runs import clearing_row, error_row, grasp_row, pick_row, stop_row
 
-from mpgrasp.bench.record import Cell, Method, Task, by_cell, line_of, played, text_of
+from mpgrasp.bench.record import Cell, Method, Task, line_of, played, text_of
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.outcome import Outcome
 

@@ -10,7 +10,7 @@ with the controllers as published, and with this project's robust ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -18,7 +18,8 @@ import numpy as np
 
 from mpgrasp.bench.analysis.pairing import pair_worlds
 from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Baseline, Claim, Measure
-from mpgrasp.bench.analysis.summary import restricted_time, time_limits
+from mpgrasp.bench.analysis.summary import time_limits
+from mpgrasp.bench.analysis.tally import restricted_time
 from mpgrasp.bench.record import Cell, Cells, PlayedLine
 from mpgrasp.statistics import FEWEST_PAIRS, SIGNIFICANCE, holm, mcnemar, wilcoxon
 
@@ -76,7 +77,9 @@ def evaluate(
     cells: Cells, claims: Sequence[Claim] = CLAIMS, baseline: Baseline = Baseline.PUBLISHED
 ) -> list[Finding]:
     """One finding per claim, in their order, with the controllers of a baseline."""
-    findings = [_test(claim, cells, baseline) for claim in claims]
+    suites = {claim.suite for claim in claims}
+    limits = time_limits({cell: lines for cell, lines in cells.items() if cell.suite in suites})
+    findings = [_test(claim, cells, limits, baseline) for claim in claims]
     tested = [k for k, f in enumerate(findings) if f.verdict not in (Verdict.ABSENT, Verdict.UNDECIDABLE)]
     for k, p in zip(tested, holm([findings[k].p for k in tested]), strict=True):
         found, verdict = findings[k], Verdict.NOT_CONFIRMED
@@ -86,7 +89,7 @@ def evaluate(
     return findings
 
 
-def _test(claim: Claim, cells: Cells, baseline: Baseline) -> Finding:
+def _test(claim: Claim, cells: Cells, limits: Mapping[str, float | None], baseline: Baseline) -> Finding:
     keys = [cell_of(cells, claim.suite, side, baseline) for side in (claim.better, claim.worse)]
     missing = [
         " + ".join(side) for side, key in zip((claim.better, claim.worse), keys, strict=True) if key is None
@@ -95,7 +98,7 @@ def _test(claim: Claim, cells: Cells, baseline: Baseline) -> Finding:
         suite_there = any(cell.suite == claim.suite for cell in cells)
         text = " and ".join(missing) if suite_there else f"suite {claim.suite}"
         return Finding(claim=claim, verdict=Verdict.ABSENT, absent=f"{text} absent")
-    limit = time_limits(cells)[claim.suite]
+    limit = limits[claim.suite]
     sides = [cells[key] for key in keys if key]
     values = [
         (_value(one, claim.measure, limit), _value(other, claim.measure, limit))

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from mpgrasp.bench.record import ErrorLine, Line, PlayedLine, played
+from mpgrasp.bench.analysis.endings import Endings, Numbers, common
+from mpgrasp.bench.record import Line, PlayedLine, played
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.statistics import mcnemar, mean_interval
-from mpgrasp.suite import base_name
-
-
-class World(NamedTuple):
-    """One scene with its start pose and sensor noise, which every detector and controller meets alike."""
-
-    suite: str
-    """Name without the point of a sweep."""
-    seed: int
-    episode: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,30 +50,29 @@ class Pairing:
         return (self.both + self.b_alone) / self.n if self.n else np.nan
 
 
-def pair(a: Iterable[Line], b: Iterable[Line]) -> Pairing:
-    """Pair the lines of two cells by suite, seed and episode; error rows are counted apart.
+def pair(a: Endings | Iterable[Line], b: Endings | Iterable[Line]) -> Pairing:
+    """Pair the episodes of two cells by suite, seed and episode; error rows are counted apart.
 
     Raises:
         ConfigError: the same episode had another scene in the other run, or occurs twice.
     """
-    a, b = list(a), list(b)
-    pairs = pair_worlds(a, b)
-    errors_a, errors_b = ([line for line in lines if isinstance(line, ErrorLine)] for lines in (a, b))
-    lost = ({_world(line) for line in errors_b} & _by_world(a).keys()) - _by_world(b).keys()
-    wins = [(one.success, other.success) for one, other in pairs]
-    times = [other.sim_time_s - one.sim_time_s for one, other in pairs if one.success and other.success]
-    difference, low, high = mean_interval(times)
-    a_alone, b_alone = wins.count((True, False)), wins.count((False, True))
+    a, b = (side if isinstance(side, Endings) else Endings.of(side) for side in (a, b))
+    ours, theirs = _places(a, b)
+    win_a, win_b = a.success[ours], b.success[theirs]
+    both = win_a & win_b
+    difference, low, high = mean_interval((b.time_s[theirs] - a.time_s[ours])[both])
+    a_alone, b_alone = int(np.sum(win_a & ~win_b)), int(np.sum(win_b & ~win_a))
+    played_by_a, _ = common(a.worlds, b.errors)
     return Pairing(
-        n=len(pairs),
-        errors_a=len(errors_a),
-        errors_b=len(errors_b),
-        lost=len(lost),
-        both=wins.count((True, True)),
+        n=len(ours),
+        errors_a=len(a.errors.suite),
+        errors_b=len(b.errors.suite),
+        lost=len(np.setdiff1d(played_by_a, ours)),
+        both=int(both.sum()),
         a_alone=a_alone,
         b_alone=b_alone,
-        same_outcome=sum(one.outcome == other.outcome for one, other in pairs),
-        identical=sum(one.state_hash == other.state_hash for one, other in pairs),
+        same_outcome=int(np.sum(a.outcome[ours] == b.outcome[theirs])),
+        identical=int(np.sum(a.state[ours] == b.state[theirs])),
         p=mcnemar(a_alone, b_alone),
         time_difference_s=difference,
         time_low=low,
@@ -91,33 +80,29 @@ def pair(a: Iterable[Line], b: Iterable[Line]) -> Pairing:
     )
 
 
-def pair_worlds(a: Iterable[Line], b: Iterable[Line]) -> list[tuple[PlayedLine, PlayedLine]]:
+def pair_worlds(a: Sequence[Line], b: Sequence[Line]) -> Iterator[tuple[PlayedLine, PlayedLine]]:
     """The lines of A and B about the same suite, seed and episode; error rows are left out.
 
     Raises:
         ConfigError: the same episode had another scene in the other run, or occurs twice.
     """
-    ours, theirs = _by_world(a), _by_world(b)
-    pairs = [(ours[key], theirs[key]) for key in ours if key in theirs]
-    for one, other in pairs:
-        if one.scene_seed != other.scene_seed:
-            raise ConfigError(
-                f"episode {one.episode} of {one.suite} had another scene in the other run",
-                got=(one.scene_seed, other.scene_seed),
-                allowed="the same scene_seed",
-            )
-    return pairs
+    endings_a, endings_b = Endings.of(a), Endings.of(b)
+    ours, theirs = _places(endings_a, endings_b)
+    lines_a = played(a[int(place)] for place in endings_a.place[ours])
+    lines_b = played(b[int(place)] for place in endings_b.place[theirs])
+    yield from zip(lines_a, lines_b, strict=True)
 
 
-def _by_world(lines: Iterable[Line]) -> dict[World, PlayedLine]:
-    worlds: dict[World, PlayedLine] = {}
-    for line in played(lines):
-        key = _world(line)
-        if key in worlds:
-            raise ConfigError("an episode occurs twice in one cell", got=tuple(key), allowed="one line each")
-        worlds[key] = line
-    return worlds
-
-
-def _world(line: Line) -> World:
-    return World(base_name(line.suite), line.seed, line.episode)
+def _places(a: Endings, b: Endings) -> tuple[Numbers, Numbers]:
+    """Places of the episodes that both played."""
+    ours, theirs = common(a.worlds, b.worlds)
+    other = np.flatnonzero(a.scene_seed[ours] != b.scene_seed[theirs])
+    if len(other):
+        one, two = ours[other[0]], theirs[other[0]]
+        suite, _, episode = a.worlds.name(int(one))
+        raise ConfigError(
+            f"episode {episode} of {suite} had another scene in the other run",
+            got=(int(a.scene_seed[one]), int(b.scene_seed[two])),
+            allowed="the same scene_seed",
+        )
+    return ours, theirs

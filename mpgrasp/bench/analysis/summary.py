@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from statistics import median
 
 import msgspec
 
+from mpgrasp.bench.analysis.endings import Endings
 from mpgrasp.bench.analysis.pairing import pair
-from mpgrasp.bench.record import (
-    Cell,
-    Cells,
-    ClearingLine,
-    Line,
-    Method,
-    PlayedLine,
-    Reach,
-    Record,
-    by_cell,
-    played,
-)
-from mpgrasp.episode.result import MOTION
+from mpgrasp.bench.analysis.tally import Tally
+from mpgrasp.bench.record import Cell, Cells, Line, Method, Record
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.outcome import Outcome
 from mpgrasp.statistics import holm, mean_interval, median_interval, restricted, wilson_interval
-
-SINGULARITY = 0.05
-"""Smallest singular value of the tool Jacobian (m, rad) below which a stop counts as one of a singularity.
-
-At 0.1 m/s the worst direction then asks a joint for 0.1 / 0.05 = 2 rad/s of the 2.175 that it may have. In
-the runs that were published when this was chosen, 5 of 6,497 attempts without a stop came below it (59 below
-0.07), and 42 of 143 with one, all stopped by the velocity or acceleration of joint 3, 4 or 5.
-"""
 
 
 class ObjectCounts(Record, frozen=True, kw_only=True):
@@ -126,57 +109,37 @@ class RunSummary(Record, frozen=True, kw_only=True):
     paired_tests: tuple[PairedTest, ...]
 
 
-def summarise(lines: Iterable[Line]) -> list[CellSummary]:
+def summarise(lines: Iterable[Line] | Cells) -> list[CellSummary]:
     """One row per cell (suite, detector, controller), in order of first appearance."""
-    cells = by_cell(lines)
-    limits = time_limits(cells)
-    return [_summary(cell, of_cell, limits[cell.suite]) for cell, of_cell in cells.items()]
+    cells = lines if isinstance(lines, Mapping) else by_cell(lines)
+    tallies = {cell: Tally(of_cell) for cell, of_cell in cells.items()}
+    limits = _least(tallies)
+    return [_summary(cell, tally, limits[cell.suite]) for cell, tally in tallies.items()]
 
 
 def time_limits(cells: Cells) -> dict[str, float | None]:
-    """Time at which an episode of each suite was broken off [s]; None where none hit its limit.
+    """Time at which an episode of each suite was broken off [s]; None where none hit its limit."""
+    return _least({cell: Tally(lines) for cell, lines in cells.items()})
 
-    Tables that were not cleared, for whatever reason, count as hits of the limit that their lines give.
-    """
-    limits: dict[str, float | None] = {cell.suite: None for cell in cells}
-    for cell, lines in cells.items():
-        for line in played(lines):
-            hit = line.time_limit_s if isinstance(line, ClearingLine) and not line.success else None
-            if hit is None and line.outcome is Outcome.TIMEOUT:
-                hit = line.sim_time_s
-            before = limits[cell.suite]
-            if hit is not None:
-                limits[cell.suite] = hit if before is None else min(before, hit)
+
+def _least(tallies: Mapping[Cell, Tally]) -> dict[str, float | None]:
+    limits: dict[str, float | None] = {}
+    for cell, tally in tallies.items():
+        found = [limit for limit in (limits.get(cell.suite), tally.limit) if limit is not None]
+        limits[cell.suite] = min(found, default=None)
     return limits
 
 
-def restricted_time(line: PlayedLine, limit: float | None = None) -> float:
-    """Simulated time of an episode cut off at its limit, or else at `limit` [s].
-
-    Who has not got to the end took at least as long as is allowed.
-    """
-    allowed = line.time_limit_s if isinstance(line, ClearingLine) else limit
-    if allowed is None:
-        return line.sim_time_s
-    return min(line.sim_time_s, allowed) if line.success else allowed
-
-
-def _summary(cell: Cell, of_cell: Sequence[Line], limit: float | None) -> CellSummary:
-    lines = played(of_cell)
-    n, successes = len(lines), sum(line.success for line in lines)
-    low, high = wilson_interval(successes, n)
-    times = [restricted_time(line) for line in lines]
-    middle, middle_low, middle_high = median_interval(times)
-    mean, mean_low, mean_high = mean_interval(restricted(times, limit))
-    values = {key: [value for line in lines if (value := getattr(line, key)) is not None] for key in MOTION}
-    stops = Counter(stop.limit for line in lines for stop in line.all_stops)
-    failures = Counter(line.outcome.value for line in lines if not line.success)
+def _summary(cell: Cell, tally: Tally, limit: float | None) -> CellSummary:
+    low, high = wilson_interval(tally.successes, tally.n)
+    middle, middle_low, middle_high = median_interval(tally.times)
+    mean, mean_low, mean_high = mean_interval(restricted(tally.times, limit))
     return CellSummary(
         **cell._asdict(),
-        n=n,
-        errors=len(of_cell) - n,
-        successes=successes,
-        rate=successes / n if n else None,
+        n=tally.n,
+        errors=tally.errors,
+        successes=tally.successes,
+        rate=tally.successes / tally.n if tally.n else None,
         wilson_low=low,
         wilson_high=high,
         median_time_s=_known(middle),
@@ -186,63 +149,45 @@ def _summary(cell: Cell, of_cell: Sequence[Line], limit: float | None) -> CellSu
         mean_time_low=_known(mean_low),
         mean_time_high=_known(mean_high),
         time_limit_s=limit,
-        reflex_stops=stops.total(),
-        reflexes=dict(sorted(stops.items())),
-        singularities=_singularities(lines),
-        failures=dict(sorted(failures.items())),
-        objects=_by_object(lines),
-        motion={key: median(numbers) for key, numbers in values.items() if numbers},
-        worst_singular_value=min(values["min_singular_value"], default=None),
-        clearing=_clearing([line for line in lines if isinstance(line, ClearingLine)]),
+        reflex_stops=tally.stops.total(),
+        reflexes=dict(sorted(tally.stops.items())),
+        singularities=tally.singular,
+        failures=dict(sorted(tally.failures.items())),
+        objects={
+            name: ObjectCounts(n=n, successes=successes)
+            for name, (n, successes) in sorted(tally.objects.items())
+        },
+        motion={key: median(numbers) for key, numbers in tally.motion.items() if numbers},
+        worst_singular_value=min(tally.motion["min_singular_value"], default=None),
+        clearing=_clearing(tally) if tally.clearings else None,
     )
-
-
-def _singularities(lines: Sequence[PlayedLine]) -> int | None:
-    """Number of attempts that a stop ended in a singular posture; None where nothing was measured."""
-    attempts: list[Reach] = []
-    for line in lines:
-        attempts += line.picks if isinstance(line, ClearingLine) else [line]
-    lowest = [
-        (attempt.min_singular_value, attempt.reflex)
-        for attempt in attempts
-        if attempt.min_singular_value is not None
-    ]
-    return sum(value < SINGULARITY and stop is not None for value, stop in lowest) if lowest else None
 
 
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _by_object(lines: Sequence[PlayedLine]) -> dict[str, ObjectCounts]:
-    endings: dict[str, list[bool]] = {}
-    for line in lines:
-        endings.setdefault(line.object, []).append(line.success)
-    return {name: ObjectCounts(n=len(ends), successes=sum(ends)) for name, ends in sorted(endings.items())}
-
-
-def _clearing(lines: Sequence[ClearingLine]) -> ClearingCounts | None:
-    if not lines:
-        return None
-    outcomes = Counter(pick.outcome for line in lines for pick in line.picks)
+def _clearing(tally: Tally) -> ClearingCounts:
+    failed = {outcome.value: n for outcome, n in sorted(tally.attempts.items()) if outcome != Outcome.SUCCESS}
     return ClearingCounts(
-        attempts=outcomes.total(),
-        failed_attempts={
-            outcome.value: count for outcome, count in sorted(outcomes.items()) if outcome != Outcome.SUCCESS
-        },
-        in_basket=sum(len(line.in_basket) for line in lines),
-        knocked_off=sum(len(line.knocked_off) for line in lines),
-        left=sum(len(line.left) for line in lines),
+        attempts=tally.attempts.total(),
+        failed_attempts=failed,
+        in_basket=tally.in_basket,
+        knocked_off=tally.knocked_off,
+        left=tally.left,
     )
 
 
-def paired_tests(lines: Iterable[Line]) -> list[PairedTest]:
+def paired_tests(lines: Iterable[Line] | Cells) -> list[PairedTest]:
     """One row per two cells of a suite over the worlds that both met."""
+    cells = lines if isinstance(lines, Mapping) else by_cell(lines)
+    suites = Counter(cell.suite for cell in cells)
+    endings = {cell: Endings.of(lines) for cell, lines in cells.items() if suites[cell.suite] > 1}
     rows: list[PairedTest] = []
-    for (cell_a, lines_a), (cell_b, lines_b) in combinations(by_cell(lines).items(), 2):
+    for (cell_a, endings_a), (cell_b, endings_b) in combinations(endings.items(), 2):
         if cell_a.suite != cell_b.suite:
             continue
-        found = pair(lines_a, lines_b)
+        found = pair(endings_a, endings_b)
         rows.append(
             PairedTest(
                 suite=cell_a.suite,

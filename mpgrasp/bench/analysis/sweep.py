@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from mpgrasp.bench.analysis.pairing import Pairing, pair
 from mpgrasp.bench.analysis.summary import CellSummary, summarise
-from mpgrasp.bench.record import Cell, Line, Method, Record, by_cell
+from mpgrasp.bench.record import Cell, Cells, Method, Record
 from mpgrasp.statistics import holm
 
 
@@ -67,10 +66,9 @@ class PointResult:
     """p of McNemar's exact test after Holm's correction over all tests of the sweep; NaN without a test."""
 
 
-def point_results(sweep: Sweep, lines: Iterable[Line]) -> list[PointResult]:
+def point_results(sweep: Sweep, cells: Cells) -> list[PointResult]:
     """Return the results of every point that was played, method by method."""
-    lines = list(lines)
-    cells, summaries = by_cell(lines), {row.cell: row for row in summarise(lines)}
+    summaries = {row.cell: row for row in summarise(cells)}
     methods = dict.fromkeys(cell.method for cell in cells)
     rows = []
     for method in methods:

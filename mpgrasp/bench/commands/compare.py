@@ -7,12 +7,13 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
 from mpgrasp.bench.analysis.pairing import Pairing, pair, pair_worlds
-from mpgrasp.bench.analysis.summary import restricted_time
+from mpgrasp.bench.analysis.tally import restricted_time
 from mpgrasp.bench.record import Cell, Cells, ClearingLine, Line
 from mpgrasp.bench.report.terminal import wide_console
 from mpgrasp.bench.results.cell_path import read_cells
@@ -171,14 +172,14 @@ def compare(a: Cells, b: Cells) -> list[Comparison]:
 def compare_times(a: Sequence[Line], b: Sequence[Line]) -> TimeTest | None:
     """Test the times of two cells over the tables that both had to clear; None if there are none."""
     pairs = [
-        (x, y) for x, y in pair_worlds(a, b) if isinstance(x, ClearingLine) and isinstance(y, ClearingLine)
-    ]
+        (x.time_limit_s, y.time_limit_s, restricted_time(x), restricted_time(y))
+        for x, y in pair_worlds(a, b) if isinstance(x, ClearingLine) and isinstance(y, ClearingLine)
+    ]  # fmt: skip
     if not pairs:
         return None
-    limit = min(line.time_limit_s for both in pairs for line in both)  # the same for A and B
-    times_a, times_b = (
-        restricted([restricted_time(line) for line in side], limit) for side in zip(*pairs, strict=True)
-    )
+    limits_a, limits_b, *times = np.array(pairs, float).T
+    limit = float(min(limits_a.min(), limits_b.min()))  # the same for A and B
+    times_a, times_b = (restricted(side, limit) for side in times)
     p, slower = wilcoxon(times_b - times_a)
     return TimeTest(mean_a=float(times_a.mean()), mean_b=float(times_b.mean()), p=p, slower=slower)
 

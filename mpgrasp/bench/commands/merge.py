@@ -6,7 +6,7 @@ import shlex
 import shutil
 import sys
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,10 +14,12 @@ import msgspec
 
 from mpgrasp.bench.playing.conclusion import conclude
 from mpgrasp.bench.playing.plan import Shard
-from mpgrasp.bench.record import Line, Method, Task
+from mpgrasp.bench.playing.roster import Roster
+from mpgrasp.bench.record import Method
 from mpgrasp.bench.results.reader import RUN, read_run
 from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescription
 from mpgrasp.bench.results.writer import RunDirectory
+from mpgrasp.bench.stored_lines import StoredLines
 from mpgrasp.command_line import Parser
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.json_values import differences
@@ -41,7 +43,7 @@ class Part:
 
     folder: Path
     about: RunDescription
-    lines: Sequence[Line]
+    lines: StoredLines
 
     @classmethod
     def read(cls, folder: Path) -> Part:
@@ -85,20 +87,16 @@ def main(command: Sequence[str]) -> int:
     parts = [Part.read(folder) for folder in dict.fromkeys(arguments.folders)]
     _refuse_strangers(parts)
     run = merged(parts, arguments.out)
-    tasks = planned(run.configuration)
-    lines = {line.task: line for part in parts for line in part.lines}
+    every = planned(run.configuration)
     for part in parts:
-        _refuse_stray_lines(part, tasks)
-    missing = len(tasks) - len(lines)
+        _refuse_stray_lines(part, every)
+    missing = len(every) - sum(len(part.lines) for part in parts)
     directory = RunDirectory.create(arguments.out, run)
     with interrupts_wait():
         _copy_files(parts, arguments.out)
-        code = conclude(
-            directory,
-            sorted(lines.values(), key=lambda line: tasks[line.task]),
-            finished=not missing,
-            sweep=run.configuration.sweep,
-        )
+        directory.settle(line for part in parts for line in part.lines)
+        lines = directory.episodes().in_order(every.place)
+        code = conclude(directory, lines, finished=not missing, sweep=run.configuration.sweep)
     others = sum(entry.made_with is not None for entry in run.resumed)
     if others:
         print(
@@ -108,7 +106,7 @@ def main(command: Sequence[str]) -> int:
         )
     if missing:
         print(
-            f"mpgrasp: {missing} of {len(tasks)} episodes are missing; --resume {arguments.out} plays them",
+            f"mpgrasp: {missing} of {len(every)} episodes are missing; --resume {arguments.out} plays them",
             file=sys.stderr,
         )
     return code or (EXIT_UNFINISHED if missing else 0)
@@ -139,11 +137,11 @@ def _refuse_strangers(parts: Sequence[Part]) -> None:
         seen[part.shard] = part
 
 
-def _refuse_stray_lines(part: Part, tasks: Mapping[Task, int]) -> None:
+def _refuse_stray_lines(part: Part, every: Roster) -> None:
     """Raise OutputError where a line is of no episode of a shard."""
     shard, seed = Shard.parse(part.shard), part.about.configuration.seed
     for line in part.lines:
-        there = line.task in tasks and shard.has(line.episode) and line.seed == seed
+        there = line.task in every and shard.has(line.episode) and line.seed == seed
         if not there or line.scene_seed != episode_seed(line.suite, seed, line.episode):
             raise OutputError(
                 f"a line of {part.folder} is of no episode of shard {shard}",
@@ -190,16 +188,12 @@ def _whole_command(command: str, out: Path) -> str:
     return shlex.join([*kept, "--out", str(out)])
 
 
-def planned(configuration: Configuration) -> dict[Task, int]:
-    """Every episode of a run, with its place in the order of the plan."""
-    methods = [Method(*cell.split("/", 1)) for cell in configuration.cells]
-    tasks = (
-        Task(part.suite.name, episode, *method)
-        for part in configuration.parts
-        for episode in range(part.episodes)
-        for method in methods
+def planned(configuration: Configuration) -> Roster:
+    """Every episode of a run, in the order of the plan."""
+    return Roster(
+        suites={part.suite.name: part.episodes for part in configuration.parts},
+        methods=[Method(*cell.split("/", 1)) for cell in configuration.cells],
     )
-    return {task: place for place, task in enumerate(tasks)}
 
 
 def _copy_files(parts: Sequence[Part], out: Path) -> None:

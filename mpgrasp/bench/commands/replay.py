@@ -120,10 +120,11 @@ def _one_episode(plan: Plan, arguments: Namespace) -> tuple[Plan, Task]:
 def _recorded_line(folder: Path, task: Task) -> Line:
     from mpgrasp.bench.results.reader import read_lines
 
-    lines = [line for line in read_lines(folder).lines if line.task == task]
-    if not lines:
+    lines = read_lines(folder).lines
+    places = [place for place, there in enumerate(lines.tasks()) if there == task]
+    if not places:
         raise ConfigError(f"the run has no {task}", got=str(folder), allowed="an episode that was played")
-    return lines[-1]
+    return lines[places[-1]]
 
 
 def _difference_of_configurations(then: Configuration, now: Configuration, task: Task) -> str | None:

@@ -12,6 +12,7 @@ from mpgrasp.bench.report.sweep import sweep_table
 from mpgrasp.bench.report.terminal import print_report_table, print_table, print_tests
 from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.command_line import EXIT_BAD_INPUT, print_error
 from mpgrasp.exceptions import OutputError
 
@@ -36,7 +37,8 @@ def conclude(
     from mpgrasp.bench.report.build import write_report
 
     code = 0
-    cells, tests = summarise(lines), paired_tests(lines)
+    by_cells = by_cell(lines)
+    cells, tests = summarise(by_cells), paired_tests(by_cells)
     errors = sum(cell.errors for cell in cells)
     try:
         directory.settle(lines)
@@ -53,7 +55,7 @@ def conclude(
     print_table(cells)
     print_tests(tests)
     if sweep and cells:
-        print_report_table(sweep_table(sweep, lines))
+        print_report_table(sweep_table(sweep, by_cells))
     print(f"Results: {directory.path}")
     if errors:
         print(

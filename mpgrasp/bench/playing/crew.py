@@ -7,7 +7,7 @@ whatever the number of workers: a line depends on its task alone.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from mpgrasp.bench.playing.plan import Plan
@@ -29,7 +29,7 @@ class Crew(Protocol):
     losses: int
     """Episodes so far of whose recordings something could not be written."""
 
-    def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
+    def play(self, tasks: Iterable[Task], sink: Sink, note: Note) -> None:
         """Play tasks.
 
         Args:
@@ -85,7 +85,7 @@ class _ThisProcess:
         self._player = player or Player(plan, run_episode)
         self.losses = 0
 
-    def play(self, tasks: Sequence[Task], sink: Sink, note: Note) -> None:
+    def play(self, tasks: Iterable[Task], sink: Sink, note: Note) -> None:
         for task in tasks:
             sink(self._line(task, note))
             if self._player.lost:

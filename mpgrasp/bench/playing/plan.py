@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from mpgrasp.bench.analysis.sweep import Sweep
+from mpgrasp.bench.playing.roster import Roster
 from mpgrasp.bench.record import Method, Task
 from mpgrasp.camera.backends import BACKENDS
 from mpgrasp.command_line import LARGEST, MOST_EPISODES
@@ -169,24 +170,29 @@ class Plan:
 
         What the plan does not have comes after everything that it has.
         """
-        suites, method = [suite.name for suite in self.suites], task.cell.method
-        if task.suite not in suites or method not in self.methods:
-            return (len(suites),)
-        return suites.index(task.suite), task.episode, self.methods.index(method)
+        suites = {suite.name: self.batch(suite) for suite in self.suites}
+        return Roster(suites=suites, methods=self.methods).place(task)
 
-    def tasks(self) -> list[Task]:
+    def count(self) -> int:
+        """Number of `tasks`."""
+        numbers = (range(self.batch(suite)) for suite in self.suites)
+        if self.shard is not None:
+            numbers = (episodes[self.shard.number - 1 :: self.shard.of] for episodes in numbers)
+        return sum(map(len, numbers)) * len(self.methods)
+
+    def tasks(self) -> Iterator[Task]:
         """A batch of every suite, in order."""
-        return [task for suite in self.suites for task in self.tasks_of(suite, 0, self.batch(suite))]
+        return (task for suite in self.suites for task in self.tasks_of(suite, 0, self.batch(suite)))
 
-    def tasks_of(self, suite: Suite, start: int, stop: int) -> list[Task]:
+    def tasks_of(self, suite: Suite, start: int, stop: int) -> Iterator[Task]:
         """Every episode of a suite from `start` to before `stop`, of every method, in order.
 
         Episode by episode, every method plays in turn, so that a run that is stopped half-way still
         compares its methods over the same episodes.
         """
-        return [
+        return (
             Task(suite.name, episode, *method)
             for episode in range(start, stop)
             if self.has(suite, episode)
             for method in self.methods
-        ]
+        )

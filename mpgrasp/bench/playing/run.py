@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from mpgrasp.bench.analysis.summary import summarise
 from mpgrasp.bench.playing.conclusion import EXIT_BROKEN, conclude
@@ -13,7 +13,7 @@ from mpgrasp.bench.playing.patience import Patience
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.planning import make_plan
 from mpgrasp.bench.playing.player import EpisodeError, Player
-from mpgrasp.bench.record import Line, Task, played
+from mpgrasp.bench.record import Line, Task
 from mpgrasp.bench.report.terminal import RunProgress
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         if arguments.resume:
             directory = RunDirectory.resume(out, content, progress.note)
         else:
-            planned = len(plan.tasks()) if plan.until_ci is None else None
+            planned = plan.count() if plan.until_ci is None else None
             directory = RunDirectory.create(out, content, planned)
         # where there are workers, each has detectors of its own: these here would only take up memory
         here = None if arguments.workers else player
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
             progress.note(f"error: {error}; the finished episodes are kept")
             code = EXIT_BAD_INPUT
     with interrupts_wait():
-        lines = sorted(directory.episodes(), key=lambda line: plan.place(line.task))
+        lines = directory.episodes().in_order(plan.place)
         return conclude(directory, lines, finished=finished, sweep=plan.sweep) or code
 
 
@@ -83,7 +83,7 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
     before = directory.episodes()
     _refuse_others(plan, directory, before)
     progress.start(before)
-    done = {line.task for line in played(before)}
+    done = before.played_tasks()
     patience = Patience()
 
     def sink(line: Line) -> None:
@@ -92,11 +92,11 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
             progress.add(line)
         patience.see(line)
 
-    def play(tasks: list[Task]) -> None:
-        crew.play([task for task in tasks if task not in done], sink, progress.note)
+    def play(tasks: Iterable[Task]) -> None:
+        crew.play((task for task in tasks if task not in done), sink, progress.note)
 
     if plan.until_ci is None:
-        progress.expect(len(plan.tasks()))
+        progress.expect(plan.count())
         play(plan.tasks())
         return True
     expected = 0
@@ -116,7 +116,7 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
     return True
 
 
-def _refuse_others(plan: Plan, directory: RunDirectory, lines: Sequence[Line]) -> None:
+def _refuse_others(plan: Plan, directory: RunDirectory, lines: Iterable[Line]) -> None:
     """Raise OutputError where a line is of no episode of the plan."""
     suites = {suite.name: suite for suite in plan.suites}
     for line in lines:
@@ -132,7 +132,7 @@ def _refuse_others(plan: Plan, directory: RunDirectory, lines: Sequence[Line]) -
         )
 
 
-def _narrow(plan: Plan, suite: Suite, lines: Sequence[Line], stop: int) -> bool:
+def _narrow(plan: Plan, suite: Suite, lines: Iterable[Line], stop: int) -> bool:
     """True if the first `stop` episodes of a suite leave no cell's interval as wide as `until_ci`."""
     assert plan.until_ci is not None
     cells = summarise(line for line in lines if line.suite == suite.name and line.episode < stop)

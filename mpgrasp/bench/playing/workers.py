@@ -16,8 +16,9 @@ import threading
 import time
 import traceback
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from itertools import islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
@@ -58,19 +59,19 @@ class WorkerPool:
         self._failed_starts = 0
         self.losses = 0
 
-    def play(self, tasks: Sequence[Task], sink: Callable[[Line], None], note: Callable[[str], None]) -> None:
-        todo: deque[Task] = deque(tasks)
+    def play(self, tasks: Iterable[Task], sink: Callable[[Line], None], note: Callable[[str], None]) -> None:
+        todo = _Queue(tasks)
         troubles: dict[Task, list[tuple[str, str]]] = defaultdict(list)
 
         def lost(task: Task, what: str, trace: str, certain: bool = False) -> None:
             troubles[task].append((what, trace))
             if len(troubles[task]) < self._attempts and not certain:
                 note(f"{what}; it is played again")
-                todo.appendleft(task)
+                todo.put_back(task)
             else:
                 sink(error_line(self._plan, task, troubles[task]))
 
-        while todo or self._busy():
+        while todo.has(1) or self._busy():
             self._hand_out(todo)
             for worker in self._wait():
                 task, (kind, content) = worker.task, worker.answer()
@@ -102,13 +103,14 @@ class WorkerPool:
     def _busy(self) -> list[_Worker]:
         return [worker for worker in self._workers if worker.task is not None]
 
-    def _hand_out(self, todo: deque[Task]) -> None:
-        while len(self._workers) < min(self._size, len(todo) + len(self._busy())):
+    def _hand_out(self, todo: _Queue) -> None:
+        while len(self._workers) < self._size and todo.has(len(self._workers) - len(self._busy()) + 1):
             self._workers.append(_Worker(self._plan, self._run_episode))
         for worker in self._workers:
             # one that died idle refuses, and is found out by the next wait
-            if todo and worker.ready and worker.task is None and worker.give(todo[0], self._limit(todo[0])):
-                todo.popleft()
+            task = todo.next() if worker.ready and worker.task is None else None
+            if task is not None and not worker.give(task, self._limit(task)):
+                todo.put_back(task)
 
     def _limit(self, task: Task) -> float:
         """Wall-clock time that an episode may take [s]."""
@@ -135,6 +137,26 @@ class WorkerPool:
                 got=trace.strip() or None,
                 allowed="enough memory for every worker, or fewer --workers",
             )
+
+
+class _Queue:
+    """Tasks of which only the next ones are made."""
+
+    def __init__(self, tasks: Iterable[Task]) -> None:
+        self._later, self._first = iter(tasks), deque[Task]()
+
+    def next(self) -> Task | None:
+        """Take the next task; None where there is none."""
+        return self._first.popleft() if self._first else next(self._later, None)
+
+    def put_back(self, task: Task) -> None:
+        """Let a task be the next one."""
+        self._first.appendleft(task)
+
+    def has(self, n: int) -> bool:
+        """True if there are n tasks or more."""
+        self._first.extend(islice(self._later, max(n - len(self._first), 0)))
+        return len(self._first) >= n
 
 
 class _Worker:

@@ -23,8 +23,8 @@ class Evaluation:
     @classmethod
     def of(cls, runs: Runs) -> Evaluation:
         """Evaluate some runs."""
-        summaries = {summary.cell: summary for summary in summarise(runs.lines)}
-        return cls(runs=runs, summaries=summaries, tests=paired_tests(runs.lines))
+        summaries = {summary.cell: summary for summary in summarise(runs.cells)}
+        return cls(runs=runs, summaries=summaries, tests=paired_tests(runs.cells))
 
     def cells(self, suite: str) -> list[Cell]:
         """Cells of a suite, in order of first appearance."""

@@ -36,14 +36,14 @@ def filmstrips(runs: Runs, kept: KeptTraces) -> Films:
     for cell, lines in runs.cells.items():
         name = name_of(cell.method)
         for word, success in (("success", True), ("failure", False)):
-            ended = [line for line in played(lines) if line.success is success]
+            ended = (line for line in played(lines) if line.success is success)
+            first = min(ended, key=lambda line: line.episode, default=None)
             shown = [
                 (ln, trace) for ln, trace in kept.by_cell[cell] if ln.success is success and trace.stills
             ]
-            if not ended:
+            if first is None:
                 without.append(f"{cell.suite}: {name}, {word}")
             elif not shown:
-                first = min(ended, key=lambda line: line.episode)
                 command = replay_command(runs.owners[cell].folder, first.task)
                 missing.append((cell.suite, name, word, str(first.episode), f"`{command}`"))
             else:

@@ -50,27 +50,29 @@ class MissingTraces:
 def read_traces(runs: Runs) -> KeptTraces:
     """Read every trace that was kept."""
     by_cell: dict[Cell, list[Traced]] = {}
-    unreadable = []
+    unreadable: list[str] = []
     for cell, lines in runs.cells.items():
-        by_cell[cell] = []
-        for line in sorted(played(lines), key=lambda line: line.episode):
+        kept = []
+        for line in played(lines):
             try:
                 trace = runs.owners[cell].trace(line)
             except MpgraspError as error:
                 unreadable.append(str(error))
                 continue
             if trace is not None:
-                by_cell[cell].append((line, trace))
+                kept.append((line, trace))
+        by_cell[cell] = sorted(kept, key=lambda traced: traced[0].episode)
     return KeptTraces(by_cell=by_cell, unreadable=unreadable)
 
 
 def missing_traces(runs: Runs, cells: Sequence[Cell], kept: KeptTraces) -> MissingTraces | None:
     """Those of some cells that were played and of which no trace was kept; None where there are none."""
-    lost = {
-        cell: min(lines, key=lambda line: line.episode)
+    first = {
+        cell: min(played(runs.cells[cell]), key=lambda line: line.episode, default=None)
         for cell in cells
-        if not kept.by_cell[cell] and (lines := played(runs.cells[cell]))
+        if not kept.by_cell[cell]
     }
+    lost = {cell: line for cell, line in first.items() if line is not None}
     if not lost:
         return None
     return MissingTraces(

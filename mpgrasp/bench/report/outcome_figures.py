@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
+DRAWN = 1000
+"""Successes, and failures, of a cell that have a mark of their own in a figure."""
 _LABEL = 24  # characters of a row's name in a line
 
 Rate = tuple[float, float, float]
@@ -55,8 +58,9 @@ def _time_figure(evaluation: Evaluation, suite: str, cells: Sequence[Cell]) -> F
     medians = (f"{name_of(cell.method)} {evaluation.summaries[cell].median_time_s:.1f} s" for cell in cells)
     alt = f"Times, suite {suite}, medians: {'; '.join(medians)}."
     times = {name_of(cell.method): _times(evaluation.runs.cells[cell]) for cell in cells}
+    thinned = f"; marks: {DRAWN} episodes of each, drawn at random" if _thinned(times) else ""
     return Figure(
-        caption=f"{suite}: simulated times; boxes show quartiles, whiskers all episodes",
+        caption=f"{suite}: simulated times; boxes show quartiles, whiskers all episodes{thinned}",
         alt=alt,
         svg=time_plot(times, alt),
     )
@@ -67,10 +71,14 @@ def _rate(successes: int, n: int) -> Rate:
 
 
 def _times(lines: Sequence[Line]) -> Times:
-    good, bad = (
-        [line.sim_time_s for line in played(lines) if line.success is success] for success in (True, False)
-    )
+    good, bad = array("d"), array("d")
+    for line in played(lines):
+        (good if line.success else bad).append(line.sim_time_s)
     return good, bad
+
+
+def _thinned(times: Mapping[str, Times]) -> bool:
+    return any(len(values) > DRAWN for pair in times.values() for values in pair)
 
 
 def success_plot(bars: Sequence[Bar], alt: str) -> str:
@@ -91,7 +99,7 @@ def success_plot(bars: Sequence[Bar], alt: str) -> str:
 
 
 def time_plot(times: Mapping[str, Times], alt: str) -> str:
-    """Boxes of the times [s] of each cell: (of successes, of failures), each episode a mark."""
+    """Boxes of the times [s] of each cell, (of successes, of failures), with marks for `DRAWN` of each."""
 
     def draw(canvas: Canvas) -> None:
         axes = canvas.subplots()
@@ -105,9 +113,10 @@ def time_plot(times: Mapping[str, Times], alt: str) -> str:
             )  # fmt: skip
             for values, colour, marker, name in ((good, GOOD, "o", "success"), (bad, BAD, "x", "failure")):
                 if values:
-                    height = k + rng.uniform(-0.2, 0.2, len(values))
+                    drawn = rng.choice(values, DRAWN, replace=False) if len(values) > DRAWN else values
+                    height = k + rng.uniform(-0.2, 0.2, len(drawn))
                     axes.plot(
-                        values,
+                        drawn,
                         height,
                         marker,
                         ms=3.5,
@@ -120,7 +129,7 @@ def time_plot(times: Mapping[str, Times], alt: str) -> str:
                     )
         _rows(axes, list(times))
         axes.set(xlabel="simulated time [s]")
-        longest = max(time_s for pair in times.values() for values in pair for time_s in values)
+        longest = max(max(values) for pair in times.values() for values in pair if values)
         axes.set_xlim(0, 1.05 * longest or 1.0)  # with room for the last tick's label
         legend_above(canvas)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from statistics import mean
 
 from mpgrasp.bench.analysis.pairing import pair
 from mpgrasp.bench.analysis.paper import (
@@ -21,7 +20,7 @@ from mpgrasp.bench.analysis.paper import (
     UNSEEN_TRIALS,
     reported,
 )
-from mpgrasp.bench.record import Cell, ClearingLine
+from mpgrasp.bench.record import Cell
 from mpgrasp.bench.report.document import Table
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.intervals import p_text, rate_text, success_text, time_text
@@ -177,13 +176,9 @@ def _clearing_texts(cell: Cell | None, reference: Cell | None, evaluation: Evalu
     if cell is None:
         return ABSENT, *"-----"
     row, lines = evaluation.summaries[cell], evaluation.runs.cells
-    cleared = [line for line in lines[cell] if isinstance(line, ClearingLine)]
-    counts = (
-        [len(line.picks) for line in cleared],
-        [sum(line.failures.values()) for line in cleared],
-        [len(line.knocked_off) for line in cleared],
-    )
-    means = (f"{mean(count):.1f}" if count else "-" for count in counts)
+    cleared = row.clearing
+    counts = (cleared.attempts, sum(cleared.failed_attempts.values()), cleared.knocked_off) if cleared else ()
+    means = [f"{count / row.n:.1f}" for count in counts] or ["-"] * 3
     longer = "-"
     if reference and cell != reference:
         found = pair(lines[reference], lines[cell])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any
 
 from mpgrasp.bench.record import ClearingLine, ErrorLine, Line
@@ -15,11 +16,14 @@ from mpgrasp.files.json_values import Difference, difference
 
 CARD = ("physics", "camera", "motion", "ik", "reflex")
 """Attributes of a run's description that make up the physics card."""
+MOST_FAILURES = 2000
+"""Failures that are listed in a report; all of them stand in episodes.jsonl."""
 _ALIKE = ("seed", "camera", "noise", "episode")  # of the configurations of runs in one report
 
 
 def failure_table(runs: Runs) -> Table | None:
-    """Every failure and every error row, with the command that plays it again; None where there are none."""
+    """Failures and error rows, with the commands that play them again; None where there are none."""
+    lost = ((run, line) for run in runs.runs for line in run.lines if not line.success)
     rows = [
         (
             line.suite,
@@ -30,12 +34,13 @@ def failure_table(runs: Runs) -> Table | None:
             _what_happened(line, run),
             f"`{replay_command(run.folder, line.task)}`",
         )
-        for run in runs.runs for line in run.lines if not line.success
-    ]  # fmt: skip
+        for run, line in islice(lost, MOST_FAILURES)
+    ]
     if not rows:
         return None
+    more = sum(1 for _ in lost)
     return Table(
-        caption=f"Failures and errors: {len(rows)}",
+        caption=f"Failures and errors: {len(rows) + more}" + (f", the first {len(rows)}" if more else ""),
         headings=("suite", "cell", "episode", "scene seed", "object", "what happened", "play it again"),
         rows=rows,
         note="The command plays the episode again, records it for rerun and as GIF, and says whether it is "

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mpgrasp.bench.analysis.sweep import PointResult, Sweep, point_results
-from mpgrasp.bench.record import Line, Method
+from mpgrasp.bench.record import Cells, Method
 from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.intervals import counts_text, p_text, rate_text, success_text, time_text
 from mpgrasp.bench.report.names import name_of
 from mpgrasp.bench.report.sweep_figure import Curve, Interval, sweep_plot
 from mpgrasp.bench.results.runs import Runs
+from mpgrasp.bench.stored_lines import by_cell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +34,7 @@ def sweep_sections(runs: Runs) -> list[SweepSection]:
         sweep = run.configuration.sweep
         if sweep is None or not run.lines:
             continue
-        rows = point_results(sweep, run.lines)
+        rows = point_results(sweep, by_cell(run.lines))
         sections.append(
             SweepSection(
                 points=_points(sweep, rows),
@@ -44,9 +45,9 @@ def sweep_sections(runs: Runs) -> list[SweepSection]:
     return sections
 
 
-def sweep_table(sweep: Sweep, lines: Iterable[Line]) -> Table:
+def sweep_table(sweep: Sweep, cells: Cells) -> Table:
     """One row for each point and method, with its test against the reference."""
-    return _points(sweep, point_results(sweep, lines))
+    return _points(sweep, point_results(sweep, cells))
 
 
 def _points(sweep: Sweep, rows: Sequence[PointResult]) -> Table:

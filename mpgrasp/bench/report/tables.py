@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from statistics import fmean
 
-from mpgrasp.bench.analysis.summary import SINGULARITY
+from mpgrasp.bench.analysis.tally import SINGULARITY
 from mpgrasp.bench.record import Cell, played
 from mpgrasp.bench.report.document import Table
 from mpgrasp.bench.report.evaluation import Evaluation
@@ -111,17 +110,20 @@ def tick_times(runs: Runs) -> TickTimes | None:
     """Wall-clock of the stages of a control tick; None where no line holds the times of all stages."""
     rows, detect_ms, whole_ms = [], 0.0, 0.0
     for cell, lines in runs.cells.items():
-        timed = [times for line in played(lines) if (times := _stage_times(line.timing)) is not None]
-        if not timed:
+        n, sums = 0, dict.fromkeys(STAGES, 0.0)
+        for times in (_stage_times(line.timing) for line in played(lines)):
+            if times is not None:
+                n, sums = n + 1, {stage: sums[stage] + times[stage] for stage in STAGES}
+        if not n:
             continue
-        means = {stage: fmean(times[stage] for times in timed) for stage in STAGES}
+        means = {stage: total / n for stage, total in sums.items()}
         tick = sum(means.values())
         network = not runs.owners[cell].reads_truth(cell.detector)
         if network:
-            detect_ms, whole_ms = detect_ms + len(timed) * means["detect"], whole_ms + len(timed) * tick
+            detect_ms, whole_ms = detect_ms + n * means["detect"], whole_ms + n * tick
         share = _share(means["detect"], tick) if network else "no network"
         values = (f"{means[stage]:.1f}" for stage in STAGES)
-        rows.append((cell.suite, name_of(cell.method), str(len(timed)), f"{tick:.1f}", *values, share))
+        rows.append((cell.suite, name_of(cell.method), str(n), f"{tick:.1f}", *values, share))
     if not rows:
         return None
     table = Table(

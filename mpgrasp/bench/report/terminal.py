@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 
 from rich.box import SIMPLE_HEAD
@@ -179,16 +179,17 @@ class RunProgress:
         if self._bar:
             self._bar.stop()
 
-    def start(self, finished: Sequence[Line]) -> None:
+    def start(self, finished: Iterable[Line]) -> None:
         """These episodes were finished in an earlier part of the run; the clock starts now."""
-        before = played(finished)
-        self._before = self._done = len(before)
-        self._successes = sum(line.success for line in before)
+        before = self._successes = 0
+        for line in played(finished):
+            before, self._successes = before + 1, self._successes + line.success
+        self._before = self._done = before
         self._start = time.monotonic()
         if self._bar:
             self._bar.reset(self._task, completed=self._done, successes=self._successes)
         elif before and not self._quiet:
-            self.note(f"{len(before)} episodes are there already")
+            self.note(f"{before} episodes are there already")
 
     def expect(self, total: int) -> None:
         """There will be so many episodes in all."""

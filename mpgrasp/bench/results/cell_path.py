@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from mpgrasp.bench.record import Cell, Cells, by_cell
+from mpgrasp.bench.record import Cell, Cells
 from mpgrasp.bench.results.reader import RUN, read_lines
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.exceptions import ConfigError
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.analysis.summary import RunSummary
-from mpgrasp.bench.record import Line, Row, line_of, record_of
+from mpgrasp.bench.record import Row, line_of, record_of
 from mpgrasp.bench.results.run_card import RunDescription
+from mpgrasp.bench.stored_lines import StoredLines, read_stored_lines
 from mpgrasp.exceptions import ConfigError, OutputError
 
 RUN, EPISODES, SUMMARY = "run.json", "episodes.jsonl", "summary.json"
@@ -20,7 +21,7 @@ RUN, EPISODES, SUMMARY = "run.json", "episodes.jsonl", "summary.json"
 class Lines:
     """Content of an episodes.jsonl."""
 
-    lines: list[Line]
+    lines: StoredLines
     whole: int
     """Bytes up to the end of the last whole line."""
     torn: bytes | None
@@ -86,26 +87,31 @@ def read_lines(path: Path) -> Lines:
     """
     file = path / EPISODES
     try:
-        data = file.read_bytes()
+        lines, whole, other = read_stored_lines(file)
     except OSError as error:
         raise OutputError(
             f"no episodes there ({error.strerror})", got=str(file), allowed="a readable file"
         ) from error
-    lines: list[Line] = []
-    whole = 0
-    texts = data.splitlines(keepends=True)
-    for number, text in enumerate(texts, 1):
-        row = _parse(text)
-        if row is None and number == len(texts):
-            return Lines(lines=lines, whole=whole, torn=text)
-        if row is None:
-            raise _no_line(file, number, text, "it is no object of JSON")
-        try:
-            lines.append(line_of(row))
-        except ConfigError as error:
-            raise _no_line(file, number, text, str(error)) from error
-        whole += len(text)
-    return Lines(lines=lines, whole=whole, torn=None)
+    if other is None:
+        return Lines(lines=lines, whole=whole, torn=None)
+    row = _parse(other.content)
+    if row is None and other.is_last:
+        return Lines(lines=lines, whole=whole, torn=other.content)
+    raise OutputError(
+        f"{file}, line {other.number} is not an episode's ({_what_is_wrong(row)})",
+        got=other.content[:60].decode(errors="replace"),
+        allowed="lines as mpgrasp.bench writes them",
+    )
+
+
+def _what_is_wrong(row: Mapping[str, Any] | None) -> str:
+    if row is None:
+        return "it is no object of JSON"
+    try:
+        line_of(row)
+    except ConfigError as error:
+        return str(error)
+    return "JSON has no such number"  # NaN or an infinity
 
 
 def _parse(text: bytes) -> Mapping[str, Any] | None:
@@ -115,11 +121,3 @@ def _parse(text: bytes) -> Mapping[str, Any] | None:
     except ValueError:
         return None
     return row if isinstance(row, dict) and text.endswith(b"\n") else None
-
-
-def _no_line(file: Path, number: int, text: bytes, reason: str) -> OutputError:
-    return OutputError(
-        f"{file}, line {number} is not an episode's ({reason})",
-        got=text[:60].decode(errors="replace"),
-        allowed="lines as mpgrasp.bench writes them",
-    )

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mpgrasp.bench.record import Cell, Cells, ErrorLine, Line, by_cell
+from mpgrasp.bench.record import Cell, Cells, ErrorLine, Line
 from mpgrasp.bench.results.reader import EPISODES, RUN, read_complete, read_run
 from mpgrasp.bench.results.run_card import Configuration, RunDescription
 from mpgrasp.bench.results.trace import Trace, read_trace
 from mpgrasp.bench.results.writer import RunDirectory
+from mpgrasp.bench.stored_lines import StoredLines, by_cell
 from mpgrasp.exceptions import ConfigError
 
 
@@ -21,7 +22,7 @@ class Run:
     folder: Path
     about: RunDescription
     """Content of run.json."""
-    lines: Sequence[Line]
+    lines: StoredLines
     """Lines of episodes.jsonl, one per episode."""
     complete: bool | None
     """True or False as summary.json says; None where there is none."""
@@ -69,11 +70,6 @@ class Runs:
     """Lines by cell."""
     owners: Mapping[Cell, Run]
     """The run that played a cell."""
-
-    @property
-    def lines(self) -> list[Line]:
-        """Every line of every run."""
-        return [line for run in self.runs for line in run.lines]
 
     @property
     def suites(self) -> list[str]:

@@ -17,9 +17,10 @@ from pathlib import Path
 import msgspec
 
 from mpgrasp.bench.analysis.summary import RunSummary
-from mpgrasp.bench.record import ErrorLine, Line, Record, Task, played, text_of
+from mpgrasp.bench.record import ErrorLine, Line, Record, played, text_of
 from mpgrasp.bench.results.reader import EPISODES, RUN, SUMMARY, read_complete, read_lines, read_run
 from mpgrasp.bench.results.run_card import Configuration, Resumption, RunDescription
+from mpgrasp.bench.stored_lines import StoredLines
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.files.json_values import differences
@@ -136,17 +137,13 @@ class RunDirectory:
         except OSError as error:
             raise _not_writable(self.episodes_file, error) from error
 
-    def episodes(self) -> list[Line]:
+    def episodes(self) -> StoredLines:
         """One line per episode so far, in the order of the file; a result counts more than an error.
 
         Raises:
             OutputError: a line that is not one of an episode.
         """
-        lines: dict[Task, Line] = {}
-        for line in read_lines(self.path).lines:
-            if line.task not in lines or not isinstance(line, ErrorLine):
-                lines[line.task] = line
-        return list(lines.values())
+        return read_lines(self.path).lines.latest()
 
     def settle(self, lines: Iterable[Line]) -> None:
         """Write all lines anew, in their final order; nothing can be appended any more.
@@ -155,7 +152,7 @@ class RunDirectory:
             OutputError: the file cannot be written anew; the old one stays as it is.
         """
         try:
-            replace_file(self.episodes_file, "".join(map(text_of, lines)))
+            replace_file(self.episodes_file, map(text_of, lines))
         except OSError as error:
             raise _not_writable(self.episodes_file, error) from error
         self._close_episodes()  # it is the old file's
@@ -255,7 +252,7 @@ class RunDirectory:
         lines = self.episodes()
         if lines:
             raise OutputError(
-                f"directory already holds this run, unfinished ({len(played(lines))} "
+                f"directory already holds this run, unfinished ({sum(1 for _ in played(lines))} "
                 f"{'' if planned is None else f'of {planned} '}episodes are there)",
                 got=str(self.path),
                 allowed=f"--resume {self.path}, or another --out",

@@ -10,7 +10,8 @@ from toy_runs import lines
 
 from mpgrasp.bench.analysis.hypotheses import Verdict, evaluate
 from mpgrasp.bench.analysis.paper import CELLS, CLAIMS, STACKED, Baseline, Claim, Measure, reported
-from mpgrasp.bench.record import by_cell, played
+from mpgrasp.bench.record import played
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.outcome import Outcome
 
 
@@ -77,7 +78,7 @@ def test_what_cannot_be_decided_is_no_part_of_the_correction() -> None:
 
 
 def test_times_are_compared_in_pairs_and_whoever_failed_took_the_limit() -> None:
-    fast = played(lines("1" * 8, time_limit_s=100.0))
+    fast = list(played(lines("1" * 8, time_limit_s=100.0)))
     slow = [
         changed(line, sim_time_s=line.sim_time_s + 1) for line in played(lines("1" * 8, controller="mvp"))
     ]

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from bench_runs import clearing_row, error_row, grasp_row, pick_row, stop_row
 
-from mpgrasp.bench.analysis.summary import SINGULARITY, CellSummary, ObjectCounts, paired_tests, summarise
+from mpgrasp.bench.analysis.summary import CellSummary, ObjectCounts, paired_tests, summarise
+from mpgrasp.bench.analysis.tally import SINGULARITY
 from mpgrasp.bench.record import Line, line_of, record_of
 from mpgrasp.bench.report.intervals import stops_text
 from mpgrasp.motion.trajectory import MotionConfig

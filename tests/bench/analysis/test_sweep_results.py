@@ -9,6 +9,7 @@ from bench_runs import error_row, grasp_row
 
 from mpgrasp.bench.analysis.sweep import Sweep, SweepPoint, SweptSetting, point_results
 from mpgrasp.bench.record import Line, line_of
+from mpgrasp.bench.stored_lines import by_cell
 
 POINTS = ("s[gamma=0]", "s[gamma=1]", "s[gamma=2]")
 SWEEP = Sweep(
@@ -33,7 +34,7 @@ def lines(suite: str, pattern: str, controller: str = "c") -> list[Line]:
 
 def test_each_point_is_tested_against_the_reference_over_the_same_worlds() -> None:
     played = [*lines(POINTS[0], "00000000"), *lines(POINTS[1], "11111110"), *lines(POINTS[2], "11111111")]
-    first, reference, last = point_results(SWEEP, played)
+    first, reference, last = point_results(SWEEP, by_cell(played))
     assert reference.is_reference
     assert reference.pairing is None
     assert first.pairing is not None
@@ -48,16 +49,16 @@ def test_each_point_is_tested_against_the_reference_over_the_same_worlds() -> No
 
 def test_methods_have_references_of_their_own_and_stand_together() -> None:
     played = [line for name in POINTS[:2] for c in "ce" for line in lines(name, "1", c)]
-    rows = point_results(SWEEP, played)
+    rows = point_results(SWEEP, by_cell(played))
     assert [(row.method.controller, row.point.suite, row.is_reference) for row in rows] == [
         ("c", POINTS[0], False), ("c", POINTS[1], True), ("e", POINTS[0], True), ("e", POINTS[1], False),
     ]  # fmt: skip
 
 
 def test_without_the_reference_nothing_is_tested_and_errors_are_no_worlds() -> None:
-    (row,) = point_results(SWEEP, lines(POINTS[0], "1"))
+    (row,) = point_results(SWEEP, by_cell(lines(POINTS[0], "1")))
     assert (row.pairing, row.is_reference) == (None, False)
-    rows = point_results(SWEEP, [*lines(POINTS[1], "1"), *lines(POINTS[2], "x")])
+    rows = point_results(SWEEP, by_cell([*lines(POINTS[1], "1"), *lines(POINTS[2], "x")]))
     assert [row.pairing for row in rows] == [None, None]
     assert rows[1].summary.errors == 1
 

@@ -196,7 +196,7 @@ def test_what_is_set_reaches_what_plays(fake_world: object, tmp_path: Path) -> N
 
     words = [*THIN, "--preset", "published-grid", *(word for text in SET for word in ("--set", text))]
     plan, _ = make_plan(parse(words))
-    Player(plan, play).play(plan.tasks()[0])
+    Player(plan, play).play(next(plan.tasks()))
     assert made["controller"].config.gamma == 4 / 3
     assert made["controller"].config.grid.extent == 0.34
     assert made["controller"].config.descent == "coupled"

@@ -145,7 +145,7 @@ def test_plug_ins_get_their_weights(tmp_path: Path) -> None:
 
 def test_the_order_of_a_plan_is_that_of_its_tasks_whatever_order_they_come_in() -> None:
     plan = make_plan(controllers=(CONTROLLER, "fakes:OtherController"), episodes=12)
-    tasks = plan.tasks()
+    tasks = list(plan.tasks())
     shuffled = [tasks[k] for k in np.random.default_rng(0).permutation(len(tasks))]
     assert sorted(shuffled, key=plan.place) == tasks
     others = [tasks[0]._replace(suite="other"), tasks[0]._replace(detector="other")]

@@ -17,8 +17,9 @@ from mpgrasp.bench.analysis.paper import Baseline
 from mpgrasp.bench.analysis.summary import ClearingCounts, summarise, time_limits
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.programme import PROGRAMMES, Programme, load_suites
-from mpgrasp.bench.record import Line, Method, by_cell, line_of
+from mpgrasp.bench.record import Line, Method, line_of
 from mpgrasp.bench.report.terminal import print_table
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.episode.config import ClearingConfig
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.scene.objects.model import ObjectModel
@@ -83,11 +84,11 @@ def test_who_is_named_plays_instead_of_the_papers_cells() -> None:
 def test_a_suite_is_played_as_often_as_the_paper_did_unless_told_otherwise() -> None:
     suites = (load_suite("unseen"), load_suite("thin"))
     plan = Plan(suites=suites, programme="p", methods=(Method("d", "c"), Method("e", "c")))
-    tasks = plan.tasks()
+    tasks = list(plan.tasks())
     assert [sum(task.suite == name for task in tasks) for name in ("unseen", "thin")] == [80, 20]
     assert [task.suite for task in tasks] == ["unseen"] * 80 + ["thin"] * 20
     few = Plan(suites=suites, methods=plan.methods, episodes=3)
-    assert len(few.tasks()) == 2 * 2 * 3
+    assert len(list(few.tasks())) == few.count() == 2 * 2 * 3
     assert len({task.stem for task in tasks}) == len(set(tasks)) == 100
 
 

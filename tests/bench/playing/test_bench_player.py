@@ -88,7 +88,7 @@ def test_a_trace_that_cannot_be_written_takes_nothing_from_its_episode(tmp_path:
     (tmp_path / "traces").write_text("in the way")
     plan = make_plan(episodes=1, traces=tmp_path / "traces", camera="ray")
     one = Player(plan, shown)
-    line = one.play(plan.tasks()[0])
+    line = one.play(next(plan.tasks()))
     assert without_timing([line]) == without_timing(lines_of(make_plan(episodes=1)))
     assert len(one.lost) == 1
     assert "a trace cannot be written" in one.lost[0]

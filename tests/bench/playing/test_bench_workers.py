@@ -81,7 +81,7 @@ def test_every_trial_has_its_own_time_after_which_it_is_taken_for_hung(
     suite = load_suite("stacked")
     plan = Plan(suites=(suite,), methods=make_plan().methods)
     pool = workers.WorkerPool(plan, 1, fakes.run_episode, hang_after=None, attempts=1)
-    assert pool._limit(plan.tasks()[0]) == 1e9
+    assert pool._limit(next(plan.tasks())) == 1e9
 
 
 def test_an_episode_that_succeeds_at_the_second_attempt_is_as_if_nothing_had_happened(

@@ -287,7 +287,7 @@ def test_runs_without_a_played_episode_have_a_report_too(tmp_path: Path, pattern
 def test_a_broken_trace_is_said_and_one_of_another_run_is_not_shown(tmp_path: Path) -> None:
     episodes = lines("110")
     run = make_run(tmp_path / "run", episodes)
-    trace(run / "traces", changed(played(episodes)[1], state_hash="other"))
+    trace(run / "traces", changed(list(played(episodes))[1], state_hash="other"))
     (run / "traces" / "thin-dhrnet-mppc-0000-success.npz").write_bytes(b"PK\3\4 no trace")
     write_report([run], run)
     text = (run / "report.md").read_text()

@@ -6,8 +6,9 @@ from toy_runs import lines
 
 from mpgrasp.bench.analysis.hypotheses import evaluate
 from mpgrasp.bench.analysis.paper import CLAIMS, Baseline
-from mpgrasp.bench.record import Line, by_cell
+from mpgrasp.bench.record import Line
 from mpgrasp.bench.report.orderings import Orderings, orderings
+from mpgrasp.bench.stored_lines import by_cell
 
 PUBLISHED = [*lines("1" * 8), *lines("0" * 8, controller="mvp")]
 ROBUST = [*lines("1" * 8, controller="mppc_robust"), *lines("1" * 8, controller="mvp_robust")]

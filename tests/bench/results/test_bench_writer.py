@@ -57,7 +57,7 @@ def test_every_line_is_on_the_disk_when_it_is_said_to_be_kept(
 def test_the_traceback_of_an_error_lies_in_a_file_of_its_own(tmp_path: Path) -> None:
     directory = RunDirectory.create(tmp_path, RUN)
     directory.append(line_of(error_row(traceback="line 1\nline 2\n")))
-    assert directory.episodes() == [line_of(error_row(traceback="errors/s-d-c-0000.txt"))]
+    assert list(directory.episodes()) == [line_of(error_row(traceback="errors/s-d-c-0000.txt"))]
     assert (tmp_path / "errors" / "s-d-c-0000.txt").read_text() == "line 1\nline 2\n"
 
 
@@ -99,7 +99,7 @@ def test_files_that_cannot_be_read_are_an_output_error(
 def test_a_complete_run_again_starts_afresh_and_keeps_the_lines_of_every_time(tmp_path: Path) -> None:
     for k in range(3):
         directory = RunDirectory.create(tmp_path, RUN)
-        assert directory.episodes() == []
+        assert list(directory.episodes()) == []
         directory.append(line_of(grasp_row(sim_time_s=float(k))))
         directory.write_summary(SUMMARY)
         directory.close()

@@ -151,7 +151,7 @@ def test_a_published_summary_follows_from_its_episodes(path: Path) -> None:
             if "singularities" not in published:  # of before they were counted
                 row.pop("singularities", None)
         assert_alike(ours, summary[key], key)
-    finished = played(lines)
+    finished = list(played(lines))
     counts = Counter(line.task.cell for line in finished)
     successes = Counter(line.task.cell for line in finished if line.success)
     worlds = {(line.task.cell, line.scene_seed) for line in finished}
