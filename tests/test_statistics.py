@@ -153,6 +153,28 @@ def test_intervals_of_many_values_hold_the_truth_as_often_as_they_say(
     assert 0.93 <= held / 1000 <= 0.97
 
 
+def test_the_interval_of_many_skewed_values_is_halls() -> None:
+    n, z = 2500, 1.959963985
+    sample = np.random.default_rng(2).lognormal(0, 1, n)
+    deviations = sample - sample.mean()
+    sd = math.sqrt(np.mean(deviations**2))
+    skewness = np.mean(deviations**3) / sd**3
+    shift = sd / n * skewness * (2 * z**2 + 1) / 6
+    half = z * sd / math.sqrt(n)
+    _, low, high = mean_interval(sample)
+    assert (low, high) == pytest.approx(
+        (sample.mean() + shift - half, sample.mean() + shift + half), rel=1e-6
+    )
+
+
+def test_few_values_are_resampled() -> None:
+    few = [1.0, 2.0, 2.0, 3.0, 9.0, 2.5, 3.0, 4.0]
+    middle, low, high = median_interval(few)
+    rng = np.random.default_rng(5)
+    medians = np.median(rng.choice(few, (20_000, len(few))), axis=1)
+    assert (middle, low, high) == pytest.approx((2.75, *np.quantile(medians, (0.025, 0.975))), abs=0.3)
+
+
 def test_many_equal_values_have_no_width() -> None:
     same = np.full(MOST_RESAMPLED + 1, 7.0)
     assert mean_interval(same) == median_interval(same) == (7.0, 7.0, 7.0)

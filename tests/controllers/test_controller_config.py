@@ -24,8 +24,13 @@ from mpgrasp.grasp import PEAK_QUALITY
         {"border": "torus"},
         {"choice": "coin"},
         {"descent": "free fall"},
+        {"z_min": -0.1},
         {"cost_heights": (0.5, 0.4)},
+        {"cost_heights": (-0.1, 0.4)},
+        {"cost_heights": (0.4, np.inf)},
         {"yaw_range": 0.5},
+        {"yaw_range": 1.5},
+        {"yaw_range": 3.2},
         {"peak_threshold": -0.1},
         {"window": 0.0},
     ],
@@ -49,6 +54,15 @@ def test_algorithm_one_differs_from_multi_view_picking_in_attenuation_and_in_its
 def test_the_robust_ones_differ_in_attenuation_alone() -> None:
     assert replace(MPPC_ROBUST, alpha=1.0) == MVP_ROBUST
     assert MPPC_ROBUST.alpha == 0.2
+
+
+def test_the_robust_ones_pay_six_times_the_published_cost() -> None:
+    assert MVP_ROBUST.gamma == pytest.approx(6 * MVP.gamma)
+
+
+def test_settings_cannot_be_changed_by_whoever_reads_them() -> None:
+    with pytest.raises(AttributeError):
+        MVP.gamma = 1.0  # type: ignore[misc]
 
 
 def test_the_published_cost_is_a_fifth_of_a_nat_for_every_fifteen_centimetres() -> None:

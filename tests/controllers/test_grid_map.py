@@ -281,5 +281,9 @@ def test_settings_that_make_no_grid_are_refused(settings: dict[str, Any]) -> Non
         GridConfig(**settings)
 
 
+def test_a_grid_may_have_no_prior_and_no_evidence() -> None:
+    assert GridConfig(evidence=0.0, prior_count=0.0).prior_count == 0.0
+
+
 def test_a_grid_may_be_a_single_cell() -> None:
     assert GridConfig(extent=0.1, cell=0.1).shape == (1, 1)

@@ -141,6 +141,19 @@ def test_the_first_violation_latches_until_reset() -> None:
     assert check(monitor) is None
 
 
+@pytest.mark.parametrize("name", ["residual", "residual_angle"])
+def test_what_ik_cannot_follow_is_a_demand_and_no_measurement(name: str) -> None:
+    reflex = check(ReflexMonitor(), solution=solution(**{name: 0.05}))
+    assert reflex is not None
+    assert reflex.demanded
+
+
+def test_a_turn_may_be_as_fast_as_the_arms_maker_says() -> None:
+    for speed, stops in ((2.49, False), (2.51, True)):
+        reflex = check(ReflexMonitor(), twist=np.array([0, 0, 0, 0, 0, speed]))
+        assert (reflex is not None) is stops
+
+
 def test_a_velocity_that_is_not_a_number_is_a_violation() -> None:
     reflex = check(ReflexMonitor(), dq=one(3, np.nan))
     assert reflex is not None
@@ -148,7 +161,15 @@ def test_a_velocity_that_is_not_a_number_is_a_violation() -> None:
 
 
 @pytest.mark.parametrize(
-    "bad", [{"contact_force": 0.0}, {"dq_max": np.ones(6)}, {"q_min": np.full(7, 9.0)}, {"ik_residual": -1.0}]
+    "bad",
+    [
+        {"contact_force": 0.0},
+        {"dq_max": np.ones(6)},
+        {"dq_max": np.ones(8)},
+        {"q_min": np.full(7, 9.0)},
+        {"q_min": panda.Q_MAX},
+        {"ik_residual": -1.0},
+    ],
 )
 def test_unusable_bounds_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):

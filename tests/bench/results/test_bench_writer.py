@@ -223,6 +223,13 @@ def test_a_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
         RunDirectory.create(tmp_path / "file" / "below", RUN)
 
 
+def test_a_summary_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> None:
+    directory = RunDirectory.create(tmp_path / "run", RUN)
+    (tmp_path / "run" / "summary.json").mkdir()
+    with pytest.raises(OutputError, match=r"cannot be written.*run/summary\.json"):
+        directory.write_summary(RunSummary(complete=True, cells=(), paired_tests=()))
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_a_full_disk_is_an_output_error(tmp_path: Path) -> None:
     directory = RunDirectory.create(tmp_path, RUN)
