@@ -59,6 +59,7 @@ TESTS: Mapping[str, tuple[str, ...]] = {
     "episode/seeds.py": ("episode/test_seeds.py",),
     "motion/reflex.py": ("motion/test_reflex.py", "motion/test_arm_driver.py"),
     "bench/results/reader.py": ("bench/results", "bench/commands/test_bench_resume.py"),
+    "bench/stored_lines.py": ("bench/test_stored_lines.py", "bench/results/test_bench_writer.py"),
     "bench/results/writer.py": ("bench/results/test_bench_writer.py", "bench/commands/test_bench_resume.py"),
 }
 """Modules below mpgrasp/, and what below tests/ must notice a change."""

@@ -57,7 +57,7 @@ def test_what_is_claimed_late_is_grasped_however_many_views_claimed_nothing_befo
 
 @pytest.mark.parametrize("name", REACHING)
 def test_as_long_as_nothing_is_found_the_best_quality_is_zero(name: str) -> None:
-    controller = make_controller(name, replace(make_controller(name).config, min_quality=1.0))
+    controller = make_controller(name, replace(MVP, min_quality=1.0))
     controller.update(observe((0.43, 0.0, 0.4), OBJECT))
     assert controller.diagnostics()["best_quality"] == 0.0
 
