@@ -6,19 +6,20 @@
 A mutant is the code with one operator, number, condition or keyword changed (cosmic-ray: Bingham, "Mutation
 testing with Cosmic Ray"). It is killed where a test fails. Changes of type annotations are left out, which no
 program can notice. Of each module a random sample is tried, drawn by the seed. All of it happens in a copy of
-the project. Survivors are listed with the reason that `mutation_reasons.toml` gives, if any.
+the project. Survivors are listed with the reason that `mutation_reasons.json` gives, if any.
 """
 
 from __future__ import annotations
 
 import ast
+import csv
 import importlib.util
+import json
 import os
 import random
 import shutil
 import sys
 import tempfile
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = RESULTS / "mutation"
-REASONS = Path(__file__).with_name("mutation_reasons.toml")
+REASONS = Path(__file__).with_name("mutation_reasons.json")
 TESTS: Mapping[str, tuple[str, ...]] = {
     "grasp.py": ("test_grasp.py",),
     "statistics.py": ("test_statistics.py",),
@@ -144,7 +145,7 @@ def reasons() -> dict[tuple[str, str, str], str]:
     """Reasons of survivors by module, line before and line after."""
     if not REASONS.exists():
         return {}
-    rows = tomllib.loads(REASONS.read_text(encoding="utf-8")).get("survivor", [])
+    rows = json.loads(REASONS.read_text(encoding="utf-8"))
     return {(row["module"], row["code"], row["changed"]): row["reason"] for row in rows}
 
 
@@ -210,6 +211,7 @@ def _study(command: Sequence[str]) -> None:
     add("--modules", metavar="M[,M]", help="below mpgrasp/ (default: all that the study knows)")
     add("--sample", metavar="N", type=int, default=60, help="mutants of each module (default: %(default)s)")
     add("--seed", metavar="S", type=int, default=0, help="of the sample (default: 0)")
+    add("--reasons", action="store_true", help="try nothing; tell today's reasons in the results of --out")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/mutation")
     options = parser.parse_args(command)
     positive("sample", options.sample)
@@ -219,17 +221,32 @@ def _study(command: Sequence[str]) -> None:
     if importlib.util.find_spec("cosmic_ray") is None:
         raise ConfigError("cosmic-ray is not installed", allowed="pip install cosmic-ray")
     prepare(options.out)
-    told = about("mutation", command, sample=options.sample, seed=options.seed, tests=TESTS)
-    played = list(play(modules, options.sample, options.seed, options.out))
+    if options.reasons:
+        told, played = _published(options.out)
+    else:
+        told = about("mutation", command, sample=options.sample, seed=options.seed, tests=TESTS)
+        played = list(play(modules, options.sample, options.seed, options.out))
     why = reasons()  # they may be written while the study lasts: survivors show in `parts/`
     rows = [{**row, "reason": why.get((row["module"], row["code"], row["changed"]), "")} for row in played]
     shares = by_module(rows)
     survivors = [row for row in rows if not row["killed"]]
     publish(options.out, "mutation", told, {"killed": shares, "survivors": survivors}, rows, draw(shares))
-    shutil.rmtree(options.out / "parts")
+    shutil.rmtree(options.out / "parts", ignore_errors=True)
     for name, share in shares.items():
         print(f"{name:<28}{share['count']:4.0f} of {share['n']:4.0f}  {100 * share['rate']:5.1f} %")
+    print(f"Survivors without a reason: {sum(not row['reason'] for row in survivors)} of {len(survivors)}")
     print(f"Results: {options.out}")
+
+
+def _published(out: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Content of run.json and the rows of a finished study."""
+    try:
+        told = json.loads((out / "run.json").read_text(encoding="utf-8"))
+        with (out / "mutation.csv").open(encoding="utf-8", newline="") as file:
+            rows: list[dict[str, Any]] = list(csv.DictReader(file))
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"no finished study there ({error})", got=str(out)) from error
+    return told, [{**row, "killed": row["killed"] == "True"} for row in rows]
 
 
 def main(command: Sequence[str] | None = None) -> int:

@@ -269,6 +269,14 @@ def real_cell_ends(error: str, outcome: str) -> tuple[int, int]:
     return sum(line["outcome"] == outcome for line in lines), len(lines)
 
 
+def arithmetic() -> tuple[int, int]:
+    """Return how many episodes before and after a change of arithmetic have one outcome, and one state."""
+    before, after = (cell(f"arithmetic/{name}", "dhrnet", "mppc_robust") for name in ("before", "after"))
+    assert before.keys() == after.keys()
+    same, equal = (sum(before[k][key] == after[k][key] for k in before) for key in ("outcome", "state_hash"))
+    return same, equal
+
+
 # clearing tables
 
 

@@ -228,3 +228,10 @@ def bits(setting: str, column: str) -> Any:
         return row["n"]
     key = {"equal %": "equal", "other outcome %": "other_outcome", "other success %": "other_success"}[column]
     return share(row[key]["count"], row["n"])
+
+
+def ceiling(name: str) -> tuple[int, list[float]]:
+    """Return the number of worlds that were searched, and the least and greatest share that lifts [%]."""
+    worlds = json.loads((RESULTS / name / "ceiling.json").read_text(encoding="utf-8"))["worlds"]
+    shares = [100 * world["lifted"] / world["tried"] for world in worlds]
+    return len(shares), [min(shares), max(shares)]

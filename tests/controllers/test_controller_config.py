@@ -27,7 +27,7 @@ from mpgrasp.grasp import PEAK_QUALITY
         {"z_min": -0.1},
         {"cost_heights": (0.5, 0.4)},
         {"cost_heights": (-0.1, 0.4)},
-        {"cost_heights": (0.4, np.inf)},
+        {"cost_heights": (0.4, float("inf"))},
         {"yaw_range": 0.5},
         {"yaw_range": 1.5},
         {"yaw_range": 3.2},

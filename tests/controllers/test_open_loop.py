@@ -33,7 +33,7 @@ def test_what_is_just_as_good_as_asked_for_is_grasped_and_what_is_worse_is_not()
         assert (controller.final_grasp() is not None) is found
 
 
-def test_a_view_of_nothing_has_a_best_quality_of_zero() -> None:
+def test_a_view_beside_the_grid_has_a_best_quality_of_zero() -> None:
     controller: Controller = make_controller("open_loop")
-    controller.update(observe((0.43, 0.0, 0.5), replace(OBJECT, quality=lambda height: 0.0)))
+    controller.update(observe((3.0, 3.0, 0.5), OBJECT))
     assert (controller.final_grasp(), controller.diagnostics()["best_quality"]) == (None, 0.0)

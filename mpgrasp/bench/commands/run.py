@@ -48,6 +48,7 @@ LONGEST = 7 * 24 * 3600.0
 def make_parser() -> argparse.ArgumentParser:
     """The command line's options; needs neither torch nor OpenGL nor MuJoCo."""
     from mpgrasp.bench.analysis.paper import Baseline
+    from mpgrasp.bench.playing.crew import ENGINES
     from mpgrasp.bench.playing.programme import PROGRAMMES
     from mpgrasp.bench.playing.workers import HANG_AFTER
     from mpgrasp.camera.backends import BACKENDS
@@ -177,6 +178,15 @@ def make_parser() -> argparse.ArgumentParser:
         default=len(os.sched_getaffinity(0)),
         help="play in K processes (default: one per core); 0 plays in this one, for debuggers",
     )
+    add(
+        "--engine",
+        metavar="|".join(ENGINES),
+        choices=ENGINES,
+        default=ENGINES[0],
+        help="what --workers are: processes of this machine, or actors of Ray, on this machine or with "
+        "--address on a cluster (pip install mpgrasp[ray]); results are the same (default: processes)",
+    )
+    add("--address", metavar="A", help="of a Ray cluster that runs, such as auto")
     add(
         "--hang-after",
         metavar="S",

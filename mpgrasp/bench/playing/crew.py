@@ -19,6 +19,9 @@ from mpgrasp.exceptions import ConfigError
 ATTEMPTS = 2
 """Times an episode is tried before it becomes an error row."""
 
+ENGINES = ("processes", "ray")
+"""What plays: processes of this machine, or actors of Ray."""
+
 Sink = Callable[[Line], None]
 Note = Callable[[str], None]
 
@@ -56,6 +59,8 @@ def make_crew(
     run_episode: Games | None = None,
     player: Player | None = None,
     hang_after: float | None = None,
+    engine: str = "processes",
+    address: str | None = None,
 ) -> Crew:
     """The crew that plays a plan.
 
@@ -68,12 +73,27 @@ def make_crew(
         player: to use in this process, if there is one already.
         hang_after: wall-clock time that an episode may take before its worker is killed [s]; None for
             that of its trial (`workers.HANG_AFTER`).
+        engine: one of `ENGINES`: processes of this machine, or actors of Ray.
+        address: of a cluster of Ray; None starts one on this machine.
+
+    Raises:
+        ConfigError: numbers or an engine that cannot be used.
     """
     if workers < 0:
         raise ConfigError("workers out of range", got=workers, allowed="0 or more")
     if hang_after is not None and not hang_after > 0:
         raise ConfigError("hang-after out of range", got=hang_after, allowed="more than 0 s")
+    if engine not in ENGINES:
+        raise ConfigError("unknown engine", got=engine, allowed=ENGINES)
+    if address is not None and engine != "ray":
+        raise ConfigError("an address without --engine ray", got=address, allowed="both or none")
     run_episode = run_episode or real_games()
+    if engine == "ray":
+        if not workers:
+            raise ConfigError("--engine ray without workers", got=0, allowed="--workers 1 or more")
+        from mpgrasp.bench.playing.ray_crew import RayCrew
+
+        return RayCrew(plan, workers, run_episode, address=address, hang_after=hang_after, attempts=ATTEMPTS)
     if workers:
         return WorkerPool(plan, workers, run_episode, hang_after=hang_after, attempts=ATTEMPTS)
     return _ThisProcess(plan, run_episode, player)

@@ -54,7 +54,14 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         del player
         code, finished = 0, False
         try:
-            crew = make_crew(plan, arguments.workers, player=here, hang_after=arguments.hang_after)
+            crew = make_crew(
+                plan,
+                arguments.workers,
+                player=here,
+                hang_after=arguments.hang_after,
+                engine=arguments.engine,
+                address=arguments.address,
+            )
             try:
                 finished = _play_batches(plan, directory, crew, progress)
             finally:

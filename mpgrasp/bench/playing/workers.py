@@ -15,16 +15,15 @@ import tempfile
 import threading
 import time
 import traceback
-from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from itertools import islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, loss_note
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player, loss_note
+from mpgrasp.bench.playing.round import Round
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
 from mpgrasp.foreign_code import load_limit
@@ -44,6 +43,12 @@ END_LIMIT = 10.0
 FAILED_STARTS = 3
 """Workers in a row that may die while they start before the run gives up."""
 
+
+def time_limit(plan: Plan, task: Task, hang_after: float | None) -> float:
+    """Wall-clock time that an episode may take [s]: what the user says, or else what is usual."""
+    return HANG_AFTER[plan.suite(task.suite).trial] if hang_after is None else hang_after
+
+
 _context = multiprocessing.get_context("spawn")
 
 
@@ -60,17 +65,7 @@ class WorkerPool:
         self.losses = 0
 
     def play(self, tasks: Iterable[Task], sink: Callable[[Line], None], note: Callable[[str], None]) -> None:
-        todo = _Queue(tasks)
-        troubles: dict[Task, list[tuple[str, str]]] = defaultdict(list)
-
-        def lost(task: Task, what: str, trace: str, certain: bool = False) -> None:
-            troubles[task].append((what, trace))
-            if len(troubles[task]) < self._attempts and not certain:
-                note(f"{what}; it is played again")
-                todo.put_back(task)
-            else:
-                sink(error_line(self._plan, task, troubles[task]))
-
+        todo = Round(self._plan, tasks, attempts=self._attempts, sink=sink, note=note)
         while todo.has(1) or self._busy():
             self._hand_out(todo)
             for worker in self._wait():
@@ -81,14 +76,14 @@ class WorkerPool:
                 if kind == "dead":
                     self._dismiss(worker)
                     if task is not None:
-                        lost(task, f"{task} {content}", worker.trace())
+                        todo.lost(task, f"{task} {content}", worker.trace())
                     elif not worker.ready:
                         self._count_failed_start(content, worker.trace())
                 elif kind == "ready":
                     worker.ready = True
                     self._failed_starts = 0
                 elif task is not None and kind == "broke":
-                    lost(task, *content)
+                    todo.lost(task, *content)
                 elif kind == "line":
                     line, lost_recordings = content
                     sink(line)
@@ -103,7 +98,7 @@ class WorkerPool:
     def _busy(self) -> list[_Worker]:
         return [worker for worker in self._workers if worker.task is not None]
 
-    def _hand_out(self, todo: _Queue) -> None:
+    def _hand_out(self, todo: Round) -> None:
         while len(self._workers) < self._size and todo.has(len(self._workers) - len(self._busy()) + 1):
             self._workers.append(_Worker(self._plan, self._run_episode))
         for worker in self._workers:
@@ -113,9 +108,7 @@ class WorkerPool:
                 todo.put_back(task)
 
     def _limit(self, task: Task) -> float:
-        """Wall-clock time that an episode may take [s]."""
-        trial = self._plan.suite(task.suite).trial
-        return HANG_AFTER[trial] if self._hang_after is None else self._hang_after
+        return time_limit(self._plan, task, self._hang_after)
 
     def _wait(self) -> list[_Worker]:
         """Workers that have something to say or have had their time."""
@@ -137,26 +130,6 @@ class WorkerPool:
                 got=trace.strip() or None,
                 allowed="enough memory for every worker, or fewer --workers",
             )
-
-
-class _Queue:
-    """Tasks of which only the next ones are made."""
-
-    def __init__(self, tasks: Iterable[Task]) -> None:
-        self._later, self._first = iter(tasks), deque[Task]()
-
-    def next(self) -> Task | None:
-        """Take the next task; None where there is none."""
-        return self._first.popleft() if self._first else next(self._later, None)
-
-    def put_back(self, task: Task) -> None:
-        """Let a task be the next one."""
-        self._first.appendleft(task)
-
-    def has(self, n: int) -> bool:
-        """True if there are n tasks or more."""
-        self._first.extend(islice(self._later, max(n - len(self._first), 0)))
-        return len(self._first) >= n
 
 
 class _Worker:
