@@ -232,6 +232,12 @@ def bits(setting: str, column: str) -> Any:
 
 def ceiling(name: str) -> tuple[int, list[float]]:
     """Return the number of worlds that were searched, and the least and greatest share that lifts [%]."""
-    worlds = json.loads((RESULTS / name / "ceiling.json").read_text(encoding="utf-8"))["worlds"]
+    worlds = study(name)["worlds"]
     shares = [100 * world["lifted"] / world["tried"] for world in worlds]
     return len(shares), [min(shares), max(shares)]
+
+
+def of_many(command: str, episodes: int = 1_000_000) -> tuple[float, float]:
+    """Return the time [s] and the greatest memory [MB] of a command on so many episodes."""
+    row = entry(study("many-episodes")["rows"], command=command, episodes=episodes)
+    return row["seconds"], row["memory_mb"]
