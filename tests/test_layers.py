@@ -27,7 +27,7 @@ ORDER = (
     "controllers", "guards", "motion", "recording", "episode",
     "suite", "plugins", "settings", "env", "inspection", "check",
     "training.data", "training",
-    "bench.record", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
+    "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
     "bench.playing", "bench.commands", "bench",
 )  # fmt: skip
 """Rooms of the house from the ground up: each may import what stands before it."""
