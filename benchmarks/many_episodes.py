@@ -27,7 +27,7 @@ from study import RESULTS, Parser, about, figure, prepare, publish, run_command,
 from mpgrasp.bench.record import Method, text_of
 from mpgrasp.bench.record import line_of as made
 from mpgrasp.bench.results.reader import EPISODES, RUN
-from mpgrasp.command_line import COUNT
+from mpgrasp.command_line import SEED
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.suite import episode_seed
 
@@ -148,7 +148,7 @@ def _study(command: Sequence[str]) -> None:
     parser = Parser(description=__doc__)
     add = parser.add_argument
     add("--episodes", metavar="N[,N]", default="10000,100000,1000000", help="default: %(default)s")
-    add("--seed", metavar="S", type=COUNT, default=1, help="of the made-up lines (default: 1)")
+    add("--seed", metavar="S", type=SEED, default=1, help="of the made-up lines (default: 1)")
     add("--out", metavar="DIR", type=Path, default=OUT, help="default: benchmarks/results/many-episodes")
     options = parser.parse_args(command)
     try:

@@ -218,7 +218,7 @@ def _study(command: Sequence[str]) -> None:
     modules = list(TESTS) if options.modules is None else options.modules.split(",")
     if unknown := [module for module in modules if module not in TESTS]:
         raise ConfigError("unknown modules", got=unknown, allowed=TESTS)
-    if importlib.util.find_spec("cosmic_ray") is None:
+    if not options.reasons and importlib.util.find_spec("cosmic_ray") is None:
         raise ConfigError("cosmic-ray is not installed", allowed="pip install cosmic-ray")
     prepare(options.out)
     if options.reasons:
@@ -246,7 +246,10 @@ def _published(out: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
             rows: list[dict[str, Any]] = list(csv.DictReader(file))
     except (OSError, ValueError) as error:
         raise ConfigError(f"no finished study there ({error})", got=str(out)) from error
-    return told, [{**row, "killed": row["killed"] == "True"} for row in rows]
+    numbers = ("line", "of")
+    return told, [
+        {**row, "killed": row["killed"] == "True", **{key: int(row[key]) for key in numbers}} for row in rows
+    ]
 
 
 def main(command: Sequence[str] | None = None) -> int:

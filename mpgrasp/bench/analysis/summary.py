@@ -12,8 +12,8 @@ import msgspec
 
 from mpgrasp.bench.analysis.endings import Endings
 from mpgrasp.bench.analysis.pairing import pair
-from mpgrasp.bench.analysis.tally import Tally
-from mpgrasp.bench.record import Cell, Cells, Line, Method, Record
+from mpgrasp.bench.analysis.tally import Tally, limit_hit
+from mpgrasp.bench.record import Cell, Cells, Line, Method, Record, played
 from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.outcome import Outcome
 from mpgrasp.statistics import holm, mean_interval, median_interval, restricted, wilson_interval
@@ -113,21 +113,22 @@ def summarise(lines: Iterable[Line] | Cells) -> list[CellSummary]:
     """One row per cell (suite, detector, controller), in order of first appearance."""
     cells = lines if isinstance(lines, Mapping) else by_cell(lines)
     tallies = {cell: Tally(of_cell) for cell, of_cell in cells.items()}
-    limits = _least(tallies)
+    limits = _by_suite({cell: tally.limit for cell, tally in tallies.items()})
     return [_summary(cell, tally, limits[cell.suite]) for cell, tally in tallies.items()]
 
 
 def time_limits(cells: Cells) -> dict[str, float | None]:
     """Time at which an episode of each suite was broken off [s]; None where none hit its limit."""
-    return _least({cell: Tally(lines) for cell, lines in cells.items()})
+    hits = {cell: filter(None, map(limit_hit, played(lines))) for cell, lines in cells.items()}
+    return _by_suite({cell: min(found, default=None) for cell, found in hits.items()})
 
 
-def _least(tallies: Mapping[Cell, Tally]) -> dict[str, float | None]:
-    limits: dict[str, float | None] = {}
-    for cell, tally in tallies.items():
-        found = [limit for limit in (limits.get(cell.suite), tally.limit) if limit is not None]
-        limits[cell.suite] = min(found, default=None)
-    return limits
+def _by_suite(limits: Mapping[Cell, float | None]) -> dict[str, float | None]:
+    """The least limit of the cells of each suite."""
+    least: dict[str, float | None] = {}
+    for cell, limit in limits.items():
+        least[cell.suite] = min(filter(None, (least.get(cell.suite), limit)), default=None)
+    return least
 
 
 def _summary(cell: Cell, tally: Tally, limit: float | None) -> CellSummary:

@@ -52,6 +52,30 @@ class Crew(Protocol):
         ...
 
 
+def check_engine(engine: str, workers: int, address: str | None) -> None:
+    """Make sure that an engine can play here.
+
+    Args:
+        engine: one of `ENGINES`.
+        workers: their number.
+        address: of a cluster of Ray; None without one.
+
+    Raises:
+        ConfigError: an unknown engine, an address or a number of workers that does not go with it, or a Ray
+            that is not there.
+    """
+    if engine not in ENGINES:
+        raise ConfigError("unknown engine", got=engine, allowed=ENGINES)
+    if engine == "ray":
+        if not workers:
+            raise ConfigError("--engine ray without workers", got=0, allowed="--workers 1 or more")
+        from mpgrasp.bench.playing.ray_crew import check
+
+        check(address)
+    elif address is not None:
+        raise ConfigError("--address without --engine ray", got=address, allowed="both or none")
+
+
 def make_crew(
     plan: Plan,
     workers: int,
@@ -77,20 +101,14 @@ def make_crew(
         address: of a cluster of Ray; None starts one on this machine.
 
     Raises:
-        ConfigError: numbers or an engine that cannot be used.
+        ConfigError: numbers that cannot be used, or no cluster at the address.
     """
     if workers < 0:
         raise ConfigError("workers out of range", got=workers, allowed="0 or more")
     if hang_after is not None and not hang_after > 0:
         raise ConfigError("hang-after out of range", got=hang_after, allowed="more than 0 s")
-    if engine not in ENGINES:
-        raise ConfigError("unknown engine", got=engine, allowed=ENGINES)
-    if address is not None and engine != "ray":
-        raise ConfigError("an address without --engine ray", got=address, allowed="both or none")
     run_episode = run_episode or real_games()
     if engine == "ray":
-        if not workers:
-            raise ConfigError("--engine ray without workers", got=0, allowed="--workers 1 or more")
         from mpgrasp.bench.playing.ray_crew import RayCrew
 
         return RayCrew(plan, workers, run_episode, address=address, hang_after=hang_after, attempts=ATTEMPTS)

@@ -165,13 +165,10 @@ class Plan:
         most = self.batch(suite) if self.until_ci is None else self.max_episodes
         return 0 <= episode < most and (self.shard is None or self.shard.has(episode))
 
-    def place(self, task: Task) -> tuple[int, ...]:
-        """Place of a task in the order of the plan: of two tasks, the one with the lesser place is first.
-
-        What the plan does not have comes after everything that it has.
-        """
+    def roster(self) -> Roster:
+        """Order of the episodes; with `until_ci`, of a batch of each suite."""
         suites = {suite.name: self.batch(suite) for suite in self.suites}
-        return Roster(suites=suites, methods=self.methods).place(task)
+        return Roster(suites=suites, methods=self.methods)
 
     def count(self) -> int:
         """Number of `tasks`."""

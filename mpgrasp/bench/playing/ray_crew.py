@@ -8,7 +8,10 @@ What is written beside the lines (recordings, traces) goes to the run's folder, 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import os
+import re
+import socket
 import sys
 import time
 import traceback
@@ -17,7 +20,7 @@ from contextlib import suppress
 from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import EpisodeError, Games, Player, loss_note
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player
 from mpgrasp.bench.playing.round import Round
 from mpgrasp.bench.playing.workers import FAILED_STARTS, time_limit
 from mpgrasp.bench.record import Line, Task
@@ -25,6 +28,10 @@ from mpgrasp.exceptions import ConfigError, MpgraspError
 
 PASSED_ON = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_CORETYPE", "MUJOCO_GL")
 """Environment variables that decide results, as they are here."""
+ANSWER_LIMIT = 10.0
+"""Time in which somebody must answer at a cluster's address [s]."""
+_HOST_AND_PORT = re.compile(r"(ray://)?(?P<host>[^/\s]+):(?P<port>\d+)")
+_CLUSTER = "the address of a cluster that runs, HOST:PORT, ray://HOST:PORT or auto"
 _LOOK = 1.0  # seconds between two looks at the clock
 
 
@@ -41,7 +48,7 @@ class RayCrew:
         attempts: times an episode is tried before it becomes an error row.
 
     Raises:
-        ConfigError: Ray is not installed, or there is no cluster at the address.
+        ConfigError: there is no cluster at the address.
     """
 
     def __init__(
@@ -59,17 +66,17 @@ class RayCrew:
         self._make = self._ray.remote(num_cpus=1, max_restarts=0)(_Host).remote
         self._shared = self._ray.put(plan), self._ray.put(run_episode)  # sent to each node once
         self._hosts: list[Any] = []
+        self._idle: list[Any] = []  # those that wait for a task
         self._answers: dict[Any, tuple[Any, Task | None, float]] = {}  # by reference: host, task, deadline
         self._failed_starts = 0
         self.losses = 0
 
     def play(self, tasks: Iterable[Task], sink: Callable[[Line], None], note: Callable[[str], None]) -> None:
         todo = Round(self._plan, tasks, attempts=self._attempts, sink=sink, note=note)
-        idle = [host for host in self._hosts if host not in self._busy()]
-        while todo.has(1) or any(task is not None for _, task, _ in self._answers.values()):
-            while idle and (task := todo.next()) is not None:
-                self._give(idle.pop(), task)
-            while len(self._hosts) < self._size and todo.has(len(self._hosts) - len(self._busy()) + 1):
+        while todo.has(1) or self._at_work():
+            while self._idle and (task := todo.next()) is not None:
+                self._give(self._idle.pop(), task)
+            while len(self._hosts) < self._size and todo.has(len(self._hosts) - self._at_work() + 1):
                 self._add_host()
             for host, task, (kind, content) in self._next_answers():
                 if kind == "refused":
@@ -81,25 +88,20 @@ class RayCrew:
                     else:
                         todo.lost(task, f"{task} {content}", "no traceback: its actor was gone\n")
                     continue
-                idle.append(host)
+                self._idle.append(host)
                 if kind == "ready":
                     self._failed_starts = 0
-                elif kind == "broke" and task is not None:
-                    todo.lost(task, *content)
-                elif kind == "line":
-                    line, lost_recordings = content
-                    sink(line)
-                    if lost_recordings:
-                        self.losses += 1
-                        note(loss_note(line.task, lost_recordings))
+                elif task is not None:
+                    self.losses += todo.hear(task, kind, content)
 
     def close(self) -> None:
         for host in list(self._hosts):
             self._dismiss(host)
         self._ray.shutdown()
 
-    def _busy(self) -> list[Any]:
-        return [host for host, _, _ in self._answers.values()]
+    def _at_work(self) -> int:
+        """Number of hosts that play; those that start do not."""
+        return sum(task is not None for _, task, _ in self._answers.values())
 
     def _add_host(self) -> None:
         host = self._make(*self._shared)
@@ -133,7 +135,7 @@ class RayCrew:
         return found
 
     def _dismiss(self, host: Any) -> None:
-        self._hosts.remove(host)
+        self._hosts.remove(host)  # it is not idle, or nothing of it would have been heard
         with suppress(self._ray.exceptions.RayError, ValueError):
             self._ray.kill(host)
 
@@ -146,14 +148,26 @@ class RayCrew:
             )
 
 
+def check(address: str | None) -> None:
+    """Make sure that Ray is installed, and that somebody answers at the address.
+
+    Raises:
+        ConfigError: it is not, or nobody does.
+    """
+    if importlib.util.find_spec("ray") is None:
+        raise ConfigError("Ray is not installed", got="--engine ray", allowed="pip install mpgrasp[ray]")
+    where = _HOST_AND_PORT.fullmatch(address or "")
+    if where is None:  # a Ray of its own, or a name such as auto, which Ray looks up at once
+        return
+    try:  # Ray itself would go on trying for a quarter of an hour
+        socket.create_connection((where["host"], int(where["port"])), timeout=ANSWER_LIMIT).close()
+    except (OSError, OverflowError) as error:
+        raise ConfigError(f"no Ray there ({error})", got=address, allowed=_CLUSTER) from error
+
+
 def _connected(address: str | None, size: int) -> Any:
     """The module ray, connected to a cluster, or to a Ray of its own with so many cores."""
-    try:
-        ray = importlib.import_module("ray")
-    except ImportError as error:
-        raise ConfigError(
-            "Ray is not installed", got="--engine ray", allowed="pip install mpgrasp[ray]"
-        ) from error
+    ray = importlib.import_module("ray")
     variables = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
     where: dict[str, Any] = {"address": address}
     if address is None:  # on a cluster, cores and modules are its own business
@@ -164,9 +178,7 @@ def _connected(address: str | None, size: int) -> Any:
     try:
         ray.init(**where, log_to_driver=False, logging_level="error", runtime_env={"env_vars": variables})
     except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
-        raise ConfigError(
-            f"no Ray there ({_words(error)})", got=address, allowed="the address of a cluster that runs"
-        ) from error
+        raise ConfigError(f"no Ray there ({_words(error)})", got=address, allowed=_CLUSTER) from error
     return ray
 
 

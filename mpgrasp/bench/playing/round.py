@@ -1,13 +1,14 @@
-"""Tasks of one round of play: which is next, and what becomes of an episode that broke off."""
+"""Tasks of one round of play: which is next, and what becomes of one that was played or broke off."""
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from itertools import islice
+from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import error_line
+from mpgrasp.bench.playing.player import error_line, loss_note
 from mpgrasp.bench.record import Line, Task
 
 
@@ -18,8 +19,8 @@ class Round:
         plan: that they belong to.
         tasks: in the order in which they are begun.
         attempts: times an episode is tried before it becomes an error row.
-        sink: takes the error rows.
-        note: is told in words of every episode that is tried again.
+        sink: takes the lines, error rows among them.
+        note: is told in words of every episode that is tried again, and of recordings that are lost.
     """
 
     def __init__(
@@ -47,6 +48,26 @@ class Round:
         """True if there are n tasks or more."""
         self._first.extend(islice(self._later, max(n - len(self._first), 0)))
         return len(self._first) >= n
+
+    def hear(self, task: Task, kind: str, content: Any) -> bool:
+        """Take what came of a task.
+
+        Args:
+            task: the episode.
+            kind: "line" or "broke".
+            content: (Line, recordings that are lost), or the arguments of `lost`.
+
+        Returns:
+            True if something of its recordings is lost.
+        """
+        if kind == "broke":
+            self.lost(task, *content)
+            return False
+        line, lost_recordings = content
+        self._sink(line)
+        if lost_recordings:
+            self._note(loss_note(task, lost_recordings))
+        return bool(lost_recordings)
 
     def lost(self, task: Task, what: str, trace: str, certain: bool = False) -> None:
         """Have an episode that broke off played again, or else told by an error row.

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from mpgrasp.bench.analysis.summary import summarise
 from mpgrasp.bench.playing.conclusion import EXIT_BROKEN, conclude
-from mpgrasp.bench.playing.crew import Crew, make_crew
+from mpgrasp.bench.playing.crew import Crew, check_engine, make_crew
 from mpgrasp.bench.playing.description import describe
 from mpgrasp.bench.playing.patience import Patience
 from mpgrasp.bench.playing.plan import Plan
@@ -33,6 +33,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
     """
     if arguments.workers < 0:
         raise ConfigError("workers out of range", got=arguments.workers, allowed="0 or more")
+    check_engine(arguments.engine, arguments.workers, arguments.address)
     plan, out = make_plan(arguments)
     player = Player(plan)  # whatever is wrong with a detector or controller shows before the first episode
     ready = player.prepare()
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
             progress.note(f"error: {error}; the finished episodes are kept")
             code = EXIT_BAD_INPUT
     with interrupts_wait():
-        lines = directory.episodes().in_order(plan.place)
+        lines = directory.episodes().in_order(plan.roster().place)
         return conclude(directory, lines, finished=finished, sweep=plan.sweep) or code
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from mpgrasp.bench.playing.plan import Plan
-from mpgrasp.bench.playing.player import EpisodeError, Games, Player, loss_note
+from mpgrasp.bench.playing.player import EpisodeError, Games, Player
 from mpgrasp.bench.playing.round import Round
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import MpgraspError
@@ -82,14 +82,8 @@ class WorkerPool:
                 elif kind == "ready":
                     worker.ready = True
                     self._failed_starts = 0
-                elif task is not None and kind == "broke":
-                    todo.lost(task, *content)
-                elif kind == "line":
-                    line, lost_recordings = content
-                    sink(line)
-                    if lost_recordings:
-                        self.losses += 1
-                        note(loss_note(line.task, lost_recordings))
+                elif task is not None:
+                    self.losses += todo.hear(task, kind, content)
 
     def close(self) -> None:
         while self._workers:

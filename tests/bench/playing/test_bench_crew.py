@@ -147,9 +147,10 @@ def test_the_order_of_a_plan_is_that_of_its_tasks_whatever_order_they_come_in() 
     plan = make_plan(controllers=(CONTROLLER, "fakes:OtherController"), episodes=12)
     tasks = list(plan.tasks())
     shuffled = [tasks[k] for k in np.random.default_rng(0).permutation(len(tasks))]
-    assert sorted(shuffled, key=plan.place) == tasks
+    place = plan.roster().place
+    assert sorted(shuffled, key=place) == tasks
     others = [tasks[0]._replace(suite="other"), tasks[0]._replace(detector="other")]
-    assert sorted([*others, tasks[-1]], key=plan.place)[0] == tasks[-1]
+    assert sorted([*others, tasks[-1]], key=place)[0] == tasks[-1]
 
 
 def test_plain_copies_are_json_and_do_not_change_between_processes() -> None:

@@ -10,8 +10,9 @@ import pytest
 from bench_plans import lines_of, make_plan, without_timing
 
 from mpgrasp.bench.__main__ import main
-from mpgrasp.bench.playing.crew import make_crew
+from mpgrasp.bench.playing.crew import check_engine, make_crew
 from mpgrasp.bench.record import ErrorLine, Line
+from mpgrasp.bench.results.reader import read_lines
 from mpgrasp.exceptions import ConfigError
 
 pytest.importorskip("ray")
@@ -52,23 +53,48 @@ def test_what_breaks_off_or_hangs_is_an_error_row_and_the_rest_goes_on() -> None
     assert len(notes) == 1
 
 
-def test_the_command_line_plays_the_same_run_with_ray(
-    tmp_path: Path, fake_world: None, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_line_plays_the_same_run_with_ray(tmp_path: Path, fake_world: pytest.MonkeyPatch) -> None:
     words = ["thin", "--detector", "fakes:FakeDetector", "--controller", "fakes:FakeController"]
     words += ["--episodes", "3", "--quiet"]
-    assert main([*words, "--engine", "ray", "--workers", "1", "--out", str(tmp_path / "a")]) == 0
+    runs = {}
+    for engine, workers in (("ray", 2), ("processes", 0)):
+        out = tmp_path / engine
+        assert main([*words, "--engine", engine, "--workers", str(workers), "--out", str(out)]) == 0
+        runs[engine] = without_timing(list(read_lines(out).lines))
+    assert runs["ray"] == runs["processes"]
+    assert len(runs["ray"]) == 3
 
 
 @pytest.mark.parametrize(
-    ("options", "reason"),
+    ("engine", "workers", "address", "reason"),
     [
-        ({"engine": "slurm"}, "unknown engine"),
-        ({"address": "auto"}, "without --engine ray"),
-        ({"engine": "ray", "workers": 0}, "without workers"),
+        ("slurm", 1, None, "unknown engine"),
+        ("processes", 1, "auto", "--address without --engine ray"),
+        ("ray", 0, None, "without workers"),
+        ("ray", 1, "127.0.0.1:1", "no Ray there"),
+        ("ray", 1, "ray://127.0.0.1:1", "no Ray there"),
+        ("ray", 1, "127.0.0.1:99999999", "no Ray there"),
     ],
 )
-def test_what_cannot_be_used_is_refused(options: dict[str, Any], reason: str) -> None:
-    workers = options.pop("workers", 1)
+def test_what_cannot_be_used_is_refused(engine: str, workers: int, address: str | None, reason: str) -> None:
     with pytest.raises(ConfigError, match=reason):
-        make_crew(make_plan(), workers, run_episode=fakes.run_episode, **options)
+        check_engine(engine, workers, address)
+
+
+def test_a_name_that_no_cluster_has_is_refused_before_a_folder_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["thin", "--engine", "ray", "--address", "127.0.0.1:1", "--workers", "1"]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 2
+    assert "no Ray there" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_no_more_actors_are_started_than_there_are_episodes() -> None:
+    plan = make_plan(episodes=1)
+    crew = make_crew(plan, 2, run_episode=fakes.run_episode, engine="ray")
+    try:
+        crew.play(plan.tasks(), lambda line: None, lambda text: None)
+        assert len(crew._hosts) == 1  # type: ignore[attr-defined]
+    finally:
+        crew.close()

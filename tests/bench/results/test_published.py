@@ -31,8 +31,6 @@ _MODIFIED = "played from a modified checkout; to be played again with the next c
 STALE = {
     "ablation-architecture": _MODIFIED,
     "ablation-fusion": _MODIFIED,
-    "run-time": _MODIFIED,
-    "thickness": _MODIFIED,
 }
 """Runs that no commit tells exactly, with the reason why they are still published."""
 
