@@ -86,14 +86,24 @@ def _row(method: Method, episode: int, scene: int, success: bool, rng: np.random
     }  # fmt: skip
 
 
-def measure(words: Sequence[str]) -> dict[str, Any]:
+def measure(words: Sequence[str], checkout: Path | None = None) -> dict[str, Any]:
     """Run a command of the benchmark; its time, and the most memory that it took.
+
+    Args:
+        words: of the command.
+        checkout: of the version that is measured; this one unless given.
 
     Raises:
         OutputError: it fails.
     """
     start = time.monotonic()
-    command = subprocess.Popen([*BENCH, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    command = subprocess.Popen(
+        [*BENCH, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        cwd=checkout,
+        env=os.environ if checkout is None else {**os.environ, "PYTHONPATH": str(checkout)},
+    )
     said = command.stderr.read() if command.stderr else b""
     _, status, used = os.wait4(command.pid, 0)
     command.returncode = os.waitstatus_to_exitcode(status)

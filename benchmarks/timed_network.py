@@ -67,8 +67,8 @@ def weights_for(name: str) -> tuple[NetworkWeights, bool]:
     """
     from mpgrasp.detectors.networks.dhrnet import AUTHORS
     from mpgrasp.detectors.networks.input import NetworkInput
-    from mpgrasp.detectors.networks.registry import build_network, declaration
-    from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
+    from mpgrasp.detectors.networks.registry import build_network, declaration, default_weights
+    from mpgrasp.detectors.networks.weights import NetworkWeights, load_weights
 
     if name != WIDE and default_weights(name).is_file():
         return load_weights(name), True
@@ -95,7 +95,7 @@ def _settle(network: nn.Module, image: NetworkInput) -> None:
 def make_runtime(weights: NetworkWeights, runtime: str) -> Runtime:
     """One of `RUNTIMES`, ready to be called."""
     from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime
-    from mpgrasp.detectors.runtimes.runtime import TorchRuntime
+    from mpgrasp.detectors.runtimes.torch_runtime import TorchRuntime
 
     if runtime.startswith("torch"):
         return TorchRuntime(weights, plain=runtime == "torch plain")

@@ -151,7 +151,7 @@ def test_a_program_takes_its_command_and_knows_all_names_in_it(
 def test_commands_of_all_programs_are_among_these() -> None:
     programs = {(c[1], *c[2:3]) if c[1] == "-m" else (Path(c[1]).name,) for c in COMMANDS}
     modules = {f"mpgrasp.{name}" for name in ("bench", "detectors", "scene", "training")}
-    studies = {"ablation.py", "held_out.py", "run_time.py", "stages.py", "table.py", "thickness.py"}
+    studies = {"ablation.py", "held_out.py", "run_time.py", "table.py", "thickness.py"}
     assert programs >= {("-m", name) for name in modules} | {(name,) for name in studies}
     bench = {c[3] for c in COMMANDS if c[2:3] == ["mpgrasp.bench"]}
     assert bench >= {"compare", "replay", "report", "paper", *suite_names()} - {"unseen", "thin_variants"}

@@ -28,7 +28,7 @@ ORDER = (
     "suite", "plugins", "settings", "env", "inspection", "check",
     "training.data", "training",
     "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
-    "bench.playing", "bench.commands", "bench",
+    "bench.playing", "bench.profiling", "bench.commands", "bench",
 )  # fmt: skip
 """Rooms of the house from the ground up: each may import what stands before it."""
 

@@ -167,7 +167,7 @@ class GraspLine(Reach, frozen=True, kw_only=True):
     detector: str
     controller: str
     timing: dict[str, float | None]
-    """Median wall time of each stage of a control tick [ms]."""
+    """Median wall time of each stage of a control tick, and `episode`, that of the whole episode [ms]."""
     state_hash: str
 
     @property

@@ -11,6 +11,7 @@ import logging
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -19,11 +20,16 @@ from numpy.typing import NDArray
 from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.central_square import central_square, empty_map, says_something
 from mpgrasp.detectors.config import NetworkDetectorConfig
-from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
+from mpgrasp.detectors.networks.registry import check_network, default_weights
+from mpgrasp.detectors.runtimes.compiled import CompiledNetwork, find, fingerprint, remember
+from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
+
+if TYPE_CHECKING:
+    from mpgrasp.detectors.networks.weights import NetworkWeights
 
 Float32 = NDArray[np.float32]
 
@@ -37,9 +43,10 @@ class NetworkDetector:
     """A grasp network behind the `GraspDetector` protocol. It keeps nothing from one frame to the next.
 
     Args:
-        weights: the network.
+        weights: the network, or one that was compiled before.
         config: image processing before and after it.
         runtime: what computes it: "auto", "torch" or "openvino", or something that is ready to.
+        mark: fingerprint of the file that they were read from, if it is one: by that they are found compiled.
 
     Raises:
         ConfigError: unknown runtime, or OpenVINO where there is none.
@@ -47,15 +54,15 @@ class NetworkDetector:
 
     def __init__(
         self,
-        weights: NetworkWeights,
+        weights: NetworkWeights | CompiledNetwork,
         config: NetworkDetectorConfig | None = None,
         runtime: str | Runtime = "auto",
+        mark: str | None = None,
     ) -> None:
-        self.name = weights.name
-        self.weights = weights
+        self.name, self._input, self._width_px = weights.name, weights.input, weights.width_px
         self.config = config or NetworkDetectorConfig()
         self.reads_truth, self.reads_colour = False, weights.input.reads_colour
-        self._asked = runtime
+        self._network, self._mark, self._asked = weights, mark, runtime
         self._runtime: Runtime | None = None
         self._name = runtime_name(runtime) if isinstance(runtime, str) else runtime.name
         self._seconds = 0.0
@@ -74,12 +81,31 @@ class NetworkDetector:
             ConfigError: unknown runtime, or OpenVINO where there is none.
             WeightsError: the file is missing, unreadable or made for another network.
         """
-        if weights is None and not default_weights(name).is_file():
+        check_network(name)
+        file = default_weights(name) if weights is None else Path(weights)
+        if weights is None and not file.is_file():
             raise WeightsError(
                 f"no weights are shipped for {name}",
                 allowed=f"--weights FILE; python -m mpgrasp.training train {name} makes one",
             )
-        return cls(load_weights(name, weights), config, runtime)
+        if isinstance(runtime, str) and runtime_name(runtime).startswith("openvino"):
+            compiled = find(name, file)
+            if compiled is not None:
+                return cls(compiled, config, compiled.runtime)
+        from mpgrasp.detectors.networks.weights import load_weights
+
+        mark = fingerprint(file)
+        read = load_weights(name, weights)
+        return cls(read, config, runtime, mark if mark == fingerprint(file) else None)
+
+    @property
+    def weights(self) -> NetworkWeights:
+        """The network in torch, read anew where a compiled one is used."""
+        if isinstance(self._network, CompiledNetwork):
+            from mpgrasp.detectors.networks.weights import load_weights
+
+            return load_weights(self.name, self._network.weights)
+        return self._network
 
     @property
     def runtime(self) -> str:
@@ -108,7 +134,9 @@ class NetworkDetector:
         if self._runtime is None:
             clock = time.perf_counter()
             ready = make_runtime(self.weights, self._asked) if isinstance(self._asked, str) else self._asked
-            image = self.weights.input
+            if self._mark is not None and isinstance(ready, OpenVinoRuntime):
+                remember(self.weights, self._mark, ready)
+            image = self._input
             ready(np.zeros((image.channels, image.size, image.size), np.float32))
             self._runtime, self._seconds = ready, time.perf_counter() - clock
             _log.info(self.readiness)
@@ -125,10 +153,10 @@ class NetworkDetector:
         """
         if self.reads_colour and frame.rgb is None:
             raise ConfigError(
-                f"{self.name} with {self.weights.input.modality} input reads colour, and the frame has none",
+                f"{self.name} with {self._input.modality} input reads colour, and the frame has none",
                 allowed="frames with rgb, as from WristCamera(colour=True), which needs OpenGL",
             )
-        image = central_square(frame, self.config.crop, self.weights.input.size)
+        image = central_square(frame, self.config.crop, self._input.size)
         seen = says_something(frame, image)
         measured = np.isfinite(image.depth)
         image = replace(image, depth=inpaint(image.depth))
@@ -145,11 +173,11 @@ class NetworkDetector:
 
         All are zero where the network's output is not finite: broken weights must not choose a grasp.
         """
-        heads = self._heads(self.weights.input(depth, rgb))
+        heads = self._heads(self._input(depth, rgb))
         if not bool((np.abs(heads) < LARGEST).all()):
             _log.warning("%s: an output that is not finite; the frame has no grasp", self.name)
             heads = np.zeros_like(heads)
-        return postprocess(heads, self.weights.width_px, self.config)
+        return postprocess(heads, self._width_px, self.config)
 
     def _heads(self, image: Float32) -> Float32:
         """Return raw heads (4, size, size) for an input (channels, size, size)."""

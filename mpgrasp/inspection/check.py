@@ -7,7 +7,7 @@ import argparse
 import numpy as np
 
 from mpgrasp.detectors.network_detector import NetworkDetector
-from mpgrasp.detectors.runtimes.runtime import TorchRuntime
+from mpgrasp.detectors.runtimes.torch_runtime import TorchRuntime
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.inspection.agreement import MAX_ANGLE, MAX_DISTANCE, compare, rendered_frames
 from mpgrasp.plugins import load_detector

@@ -172,10 +172,14 @@ class Plan:
 
     def count(self) -> int:
         """Number of `tasks`."""
-        numbers = (range(self.batch(suite)) for suite in self.suites)
+        return sum(map(self.count_of, self.suites))
+
+    def count_of(self, suite: Suite) -> int:
+        """Number of tasks of a batch of a suite."""
+        episodes = range(self.batch(suite))
         if self.shard is not None:
-            numbers = (episodes[self.shard.number - 1 :: self.shard.of] for episodes in numbers)
-        return sum(map(len, numbers)) * len(self.methods)
+            episodes = episodes[self.shard.number - 1 :: self.shard.of]
+        return len(episodes) * len(self.methods)
 
     def tasks(self) -> Iterator[Task]:
         """A batch of every suite, in order."""

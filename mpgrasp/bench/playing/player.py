@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from typing import Any
+
+import msgspec
 
 from mpgrasp.bench.playing.cast import Cast
 from mpgrasp.bench.playing.plan import Plan
@@ -16,6 +19,9 @@ from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError, PlugInError
 from mpgrasp.recording.recorder import NullRecorder, Recorder
 from mpgrasp.suite import episode_seed
+
+EPISODE = "episode"
+"""Key of an episode's wall time in the `timing` of its line."""
 
 RunEpisode = Callable[..., Any]
 """Called like `mpgrasp.episode.episode.run_episode`; returns what has `as_record()`."""
@@ -83,7 +89,7 @@ class Player:
         Raises:
             EpisodeError: something went wrong on the way; it is the cause.
         """
-        self.lost = []
+        self.lost, clock = [], time.perf_counter()
         suite, games, trace = self.plan.suite(task.suite), self._run_episode, self._trace(task)
         run_episode = games if callable(games) else games[suite.trial]
         try:
@@ -101,7 +107,8 @@ class Player:
             self._save(trace, line)
         except (Exception, SystemExit) as error:  # a plug-in that exits must not end the run
             raise EpisodeError(f"{task} broke off: {type(error).__name__}: {error}") from error
-        return line
+        timing = {**line.timing, EPISODE: 1e3 * (time.perf_counter() - clock)}
+        return msgspec.structs.replace(line, timing=timing)
 
     def _forgetful(self) -> list[str]:
         """Return a line for people on each controller that will try what has failed again and again."""

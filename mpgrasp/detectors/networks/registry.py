@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mpgrasp import paths
 from mpgrasp.detectors.networks.declaration import NetworkDeclaration
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.forking import refuse_inherited_torch
@@ -33,6 +35,11 @@ def check_network(name: str) -> None:
     """Raise ConfigError unless there is a network of that name."""
     if name not in NETWORKS:
         raise ConfigError("unknown network", got=name, allowed=NETWORKS)
+
+
+def default_weights(name: str) -> Path:
+    """Return the path of a network's shipped weights."""
+    return paths.WEIGHTS / f"{name}.safetensors"
 
 
 def declaration(name: str) -> NetworkDeclaration:

@@ -13,11 +13,16 @@ from safetensors import SafetensorError
 from safetensors.torch import save_file
 from torch import nn
 
-from mpgrasp import paths
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks.description import FORMAT, opened, read_description
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import NETWORKS, build_network, check_network, declaration
+from mpgrasp.detectors.networks.registry import (
+    NETWORKS,
+    build_network,
+    check_network,
+    declaration,
+    default_weights,
+)
 from mpgrasp.detectors.networks.state import (
     check_entries,
     check_numbers,
@@ -79,11 +84,6 @@ def save_weights(
         temporary.replace(path)
     except (OSError, SafetensorError) as error:
         raise OutputError(f"weights cannot be written: {error}", got=str(path)) from error
-
-
-def default_weights(name: str) -> Path:
-    """Return the path of a network's shipped weights."""
-    return paths.WEIGHTS / f"{name}.safetensors"
 
 
 def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:

@@ -1,35 +1,34 @@
 """Networks in OpenVINO (https://docs.openvino.ai), compiled once and kept on disk.
 
 Converting and compiling takes seconds, reading what was compiled a fraction of one. A file in the cache is
-named after all that it was made from: weights, network code, precision, versions and processor.
+named after all that it was made from: weights, network code, precision, versions and processor. Reading it
+takes no torch.
 """
 
 from __future__ import annotations
 
 import contextlib
-import copy
 import functools
 import hashlib
 import importlib
-import inspect
 import json
 import logging
 import os
 import sys
-import warnings
+from importlib import metadata
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import nn
 
 from mpgrasp import paths
-from mpgrasp.detectors.networks.weights import NetworkWeights
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.forking import OPENVINO, refuse_inherited, starting
+
+if TYPE_CHECKING:
+    from mpgrasp.detectors.networks.weights import NetworkWeights
 
 Float32 = NDArray[np.float32]
 
@@ -52,25 +51,37 @@ class OpenVinoRuntime:
     device = "cpu"
 
     def __init__(self, weights: NetworkWeights, precision: str | None = None) -> None:
+        from mpgrasp.detectors.runtimes.conversion import convert
+
         precision = precision or openvino_precision()
         if precision is None:
             raise ImportError("openvino cannot be imported")
-        self.name = f"openvino {precision}"
-        settings = {
-            "INFERENCE_PRECISION_HINT": precision,
-            "INFERENCE_NUM_THREADS": torch.get_num_threads(),
-            "PERFORMANCE_HINT": "LATENCY",
-            "NUM_STREAMS": 1,
-            # pinned, processes of one thread each would all sit on the first core
-            "ENABLE_CPU_PINNING": False,
-        }
+        settings = compile_settings(precision, threads())
         file = _cache_file(weights, settings)
         blob = _read(file)
-        self.cached = blob is not None
+        cached = blob is not None
         if blob is None:
-            blob = _core().compile_model(_convert(weights), _DEVICE, settings).export_model().getvalue()
-            _write(file, blob)
+            model = convert(weights, _openvino())
+            blob = _core().compile_model(model, _DEVICE, settings).export_model().getvalue()
+            if not _write(file, blob):
+                file = None
         # what was just compiled is read back too, so that the first run is like all others
+        self._load(blob, settings, cached, file)
+
+    @classmethod
+    def of_file(cls, file: Path, settings: dict[str, Any]) -> OpenVinoRuntime | None:
+        """Return the network in a file of the cache, compiled with such settings; None if it is not whole."""
+        blob = _read(file)
+        if blob is None:
+            return None
+        made = cls.__new__(cls)
+        made._load(blob, settings, True, file)
+        return made
+
+    def _load(self, blob: bytes, settings: dict[str, Any], cached: bool, file: Path | None) -> None:
+        self.name = f"openvino {settings['INFERENCE_PRECISION_HINT']}"
+        self.cached, self.settings, self.file = cached, settings, file
+        """True if it was compiled before; what it was compiled with; where it is kept, if it is."""
         self._request = _core().import_model(blob, _DEVICE, settings).create_infer_request()
 
     def __call__(self, image: Float32) -> Float32:
@@ -88,6 +99,43 @@ def openvino_precision() -> str | None:
         _log.info("no OpenVINO here: %s", error)
         return None
     return "bf16" if "BF16" in capabilities else "f32"
+
+
+def compile_settings(precision: str, count: int) -> dict[str, Any]:
+    """Return the settings with which networks are compiled, for so many threads."""
+    return {
+        "INFERENCE_PRECISION_HINT": precision,
+        "INFERENCE_NUM_THREADS": count,
+        "PERFORMANCE_HINT": "LATENCY",
+        "NUM_STREAMS": 1,
+        # pinned, processes of one thread each would all sit on the first core
+        "ENABLE_CPU_PINNING": False,
+    }
+
+
+def threads() -> int:
+    """Return how many threads torch computes on; imports it only where OMP_NUM_THREADS does not say so."""
+    said = os.environ.get("OMP_NUM_THREADS", "")
+    if "torch" not in sys.modules and said.isdecimal() and int(said) > 0:
+        return int(said)
+    import torch
+
+    return torch.get_num_threads()
+
+
+def machine() -> dict[str, Any]:
+    """Return versions and processor, which decide what compiling makes."""
+    return {
+        "versions": [_openvino().__version__, metadata.version("torch")],
+        "processor": _core().get_property(_DEVICE, "FULL_DEVICE_NAME"),
+        "capabilities": sorted(_core().get_property(_DEVICE, "OPTIMIZATION_CAPABILITIES")),
+    }
+
+
+def cache_folder() -> Path | None:
+    """Return the folder in which compiled networks are kept; None where there is no cache."""
+    folder = paths.cache_folder()
+    return None if folder is None else folder / "openvino"
 
 
 def _core() -> Any:
@@ -117,51 +165,21 @@ def _openvino() -> ModuleType:
     return openvino
 
 
-class _OneOutput(nn.Module):
-    """A network with its heads in one tensor (n, 4, H, W)."""
-
-    def __init__(self, network: nn.Module) -> None:
-        super().__init__()
-        self.network = network
-
-    def forward(self, image: torch.Tensor) -> torch.Tensor:
-        return torch.cat(tuple(self.network(image)), dim=1)
-
-
-def _convert(weights: NetworkWeights) -> Any:
-    """Return OpenVINO's model of the network for one image; it folds batch norms when it compiles."""
-    shape = _shape(weights)
-    network = _OneOutput(copy.deepcopy(weights.network).cpu().float().eval())
-    with warnings.catch_warnings(), torch.inference_mode():
-        warnings.simplefilter("ignore")  # tracing warns of every shape that it takes for a constant
-        return _openvino().convert_model(network, example_input=torch.zeros(shape), input=[shape])
-
-
-def _shape(weights: NetworkWeights) -> tuple[int, int, int, int]:
-    return 1, weights.input.channels, weights.input.size, weights.input.size
-
-
 def _cache_file(weights: NetworkWeights, settings: dict[str, Any]) -> Path | None:
-    folder = paths.cache_folder()
+    from mpgrasp.detectors.runtimes.conversion import content, shape
+
+    folder = cache_folder()
     if folder is None:
         return None
-    openvino = _openvino()
     about = {
-        "versions": [openvino.__version__, torch.__version__],
-        "processor": _core().get_property(_DEVICE, "FULL_DEVICE_NAME"),
-        "capabilities": sorted(_core().get_property(_DEVICE, "OPTIMIZATION_CAPABILITIES")),
+        **machine(),
         "compiled": settings,
-        "network": [weights.name, dict(weights.settings), _shape(weights)],
+        "network": [weights.name, dict(weights.settings), shape(weights)],
     }
     digest = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
-    layers = {type(layer) for layer in weights.network.modules()}
-    sources = {inspect.getfile(layer) for layer in layers if not layer.__module__.startswith("torch.")}
-    for source in sorted({*sources, __file__}):
-        digest.update(Path(source).read_bytes())
-    for key, value in sorted(weights.network.state_dict().items()):
-        digest.update(key.encode())
-        digest.update(value.detach().cpu().contiguous().numpy().tobytes())
-    return folder / "openvino" / f"{weights.name}-{digest.hexdigest()[:32]}.ov"
+    for part in content(weights):
+        digest.update(part)
+    return folder / f"{weights.name}-{digest.hexdigest()[:32]}.ov"
 
 
 def _read(file: Path | None) -> bytes | None:
@@ -180,10 +198,10 @@ def _read(file: Path | None) -> bytes | None:
     return blob
 
 
-def _write(file: Path | None, blob: bytes) -> None:
+def _write(file: Path | None, blob: bytes) -> bool:
     """Keep a compiled network; where that is not possible the next start takes as long as this one."""
     if file is None:
-        return
+        return False
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         replace_file(file, hashlib.sha256(blob).digest() + blob)
@@ -192,3 +210,5 @@ def _write(file: Path | None, blob: bytes) -> None:
             old.unlink(missing_ok=True)
     except OSError as error:
         _log.info("a compiled network cannot be kept: %s", error)
+        return False
+    return True

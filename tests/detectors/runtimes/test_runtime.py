@@ -18,12 +18,13 @@ from mpgrasp.depth import CameraIntrinsics, DepthFrame
 from mpgrasp.detectors.__main__ import main
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.input import NetworkInput
-from mpgrasp.detectors.networks.registry import build_network
-from mpgrasp.detectors.networks.weights import NetworkWeights, default_weights, load_weights
+from mpgrasp.detectors.networks.registry import build_network, default_weights
+from mpgrasp.detectors.networks.weights import NetworkWeights, load_weights
 from mpgrasp.detectors.runtimes import openvino as openvino_runtime
 from mpgrasp.detectors.runtimes import runtime as runtimes
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
-from mpgrasp.detectors.runtimes.runtime import TorchRuntime, make_runtime, runtime_name
+from mpgrasp.detectors.runtimes.runtime import make_runtime, runtime_name
+from mpgrasp.detectors.runtimes.torch_runtime import TorchRuntime
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import looking_down
 from mpgrasp.grasp import GraspMap
