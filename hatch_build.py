@@ -10,7 +10,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-DATA = ("assets/*", "scenes/*", "benchmarks/*.toml", "benchmarks/README.md")
+DATA = ("assets/*", "scenes/*", "benchmarks/*.toml", "benchmarks/ladders", "benchmarks/README.md")
 """Patterns of files and folders."""
 
 

@@ -241,3 +241,18 @@ def of_many(command: str, episodes: int = 1_000_000) -> tuple[float, float]:
     """Return the time [s] and the greatest memory [MB] of a command on so many episodes."""
     row = entry(study("many-episodes")["rows"], command=command, episodes=episodes)
     return row["seconds"], row["memory_mb"]
+
+
+def cost(name: str, column: str) -> float:
+    """Return a column of what something costs, beside the commit before."""
+    return float(entry(study("before")["rows"], cost=name)[column])
+
+
+def workers(engine: str, number: int) -> dict[str, float]:
+    """Return the row of an engine with a number of workers."""
+    return dict(entry(study("scaling")["rows"], engine=engine, workers=number))
+
+
+def step_of(environment: str) -> float:
+    """Return the CPU time of a usual step [ms]."""
+    return float(entry(study("environments")["rows"], environment=environment)["median_ms"])

@@ -19,7 +19,7 @@ PACKAGE = Path(mpgrasp.__file__).parent
 ORDER = (
     "exceptions", "names", "forking", "processes", "foreign_code",
     "linear_algebra", "geometry", "paths", "outcome", "workspace",
-    "files", "command_line", "statistics",
+    "files", "command_line", "statistics", "thresholds",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",
     "scene.objects", "scene",
@@ -27,6 +27,7 @@ ORDER = (
     "controllers", "guards", "motion", "recording", "episode",
     "suite", "plugins", "settings", "env", "inspection", "check",
     "training.data", "training",
+    "bench.ladders",
     "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
     "bench.playing", "bench.profiling", "bench.commands", "bench",
 )  # fmt: skip

@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from mpgrasp.bench.commands.run import parse
 from mpgrasp.command_line import run_command
 
-SUBCOMMANDS = ("compare", "merge", "plan", "profile", "replay", "report", "settings", "sweep")
+SUBCOMMANDS = (
+    "compare", "ladder", "ladders", "merge", "plan", "profile", "replay", "report", "settings", "sweep",
+)  # fmt: skip
 """Words in the place of SUITE, each in its own module."""
 
 

@@ -21,6 +21,7 @@ from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.central_square import central_square, empty_map, says_something
 from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.networks.registry import check_network, default_weights
+from mpgrasp.detectors.runtimes import SHARED
 from mpgrasp.detectors.runtimes.compiled import CompiledNetwork, find, fingerprint, remember
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
@@ -88,6 +89,11 @@ class NetworkDetector:
                 f"no weights are shipped for {name}",
                 allowed=f"--weights FILE; python -m mpgrasp.training train {name} makes one",
             )
+        if runtime == SHARED:
+            from mpgrasp.detectors.runtimes.shared import shared_network
+
+            shared = shared_network(name, file)
+            return cls(shared, config, shared.runtime)
         if isinstance(runtime, str) and runtime_name(runtime).startswith("openvino"):
             compiled = find(name, file)
             if compiled is not None:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bench_runs import records
+from bench_runs import records, records_without_timing
 
+from mpgrasp.bench.__main__ import main
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.exceptions import CameraError
 from mpgrasp.scene.scene import build_scene
@@ -57,3 +58,12 @@ def test_the_same_seed_plays_the_same_episode_in_any_process_and_unrecorded(tmp_
     second = play(tmp_path / "b", *options, "--workers", "2", "--quiet")
     del first["timing"], second["timing"]
     assert first == second
+
+
+def test_workers_that_share_their_networks_play_what_workers_with_their_own_do(tmp_path: Path) -> None:
+    options = ["--detector", "ggcnn2", "--controller", "open_loop", "--episodes", "2", "--workers", "2"]
+    for runtime in ("auto", "shared"):
+        out = tmp_path / runtime
+        assert main(["thin", *options, "--runtime", runtime, "--quiet", "--out", str(out)]) == 0
+    assert records_without_timing(tmp_path / "auto") == records_without_timing(tmp_path / "shared")
+    assert main(["replay", str(tmp_path / "shared"), "--episode", "0"]) == 0

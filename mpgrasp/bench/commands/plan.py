@@ -70,7 +70,7 @@ def main(command: Sequence[str]) -> int:
         raise ConfigError("the following arguments are required: SUITE", allowed="see --help")
     from rich.console import Console
 
-    from mpgrasp.bench.playing.crew import check_engine, make_crew
+    from mpgrasp.bench.playing.crew import check_engine, make_crew, shared_networks
     from mpgrasp.bench.playing.planning import make_plan
     from mpgrasp.bench.playing.player import Player
     from mpgrasp.bench.profiling.forecast import forecast
@@ -78,7 +78,7 @@ def main(command: Sequence[str]) -> int:
     check_engine(arguments.engine, arguments.workers, arguments.address)
     plan, _ = make_plan(arguments)
     console = Console()
-    with tempfile.TemporaryDirectory() as folder:
+    with shared_networks(plan.runtime, arguments.engine), tempfile.TemporaryDirectory() as folder:
         plan = dataclasses.replace(plan, traces=Path(folder), record=0)
         Player(plan).prepare()
         crew = make_crew(

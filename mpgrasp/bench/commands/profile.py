@@ -72,6 +72,7 @@ def main(command: Sequence[str]) -> int:
     from rich.console import Console
 
     from mpgrasp.bench.commands.run import make_parser as run_parser
+    from mpgrasp.bench.playing.crew import shared_networks
     from mpgrasp.bench.playing.planning import make_plan
     from mpgrasp.bench.playing.player import Player
     from mpgrasp.bench.profiling.cost import measure
@@ -80,7 +81,7 @@ def main(command: Sequence[str]) -> int:
     vars(arguments).update(given)
     plan, _ = make_plan(arguments)
     console = Console()
-    with tempfile.TemporaryDirectory() as folder:
+    with shared_networks(plan.runtime, "processes"), tempfile.TemporaryDirectory() as folder:
         player = Player(dataclasses.replace(plan, traces=Path(folder)))
         for line in player.prepare():
             console.print(line, highlight=False)

@@ -65,17 +65,24 @@ def main(command: Sequence[str]) -> int:
         MpgraspError: input that cannot be used.
     """
     from mpgrasp.bench.commands.run import make_parser as run_parser
-    from mpgrasp.bench.playing.description import configuration
+    from mpgrasp.bench.playing.crew import shared_networks
     from mpgrasp.bench.playing.planning import make_plan
-    from mpgrasp.bench.playing.player import Player, loss_note
     from mpgrasp.bench.playing.recorded_command import recorded_arguments
+
+    arguments = make_parser().parse_args(command)
+    given = [word for file in arguments.weights for word in ("--weights", file)]
+    plan, _ = make_plan(recorded_arguments(arguments.run, run_parser(), given))
+    with shared_networks(plan.runtime, "processes"):
+        return _replay(plan, arguments)
+
+
+def _replay(plan: Plan, arguments: Namespace) -> int:
+    from mpgrasp.bench.playing.description import configuration
+    from mpgrasp.bench.playing.player import Player, loss_note
     from mpgrasp.bench.results.provenance import provenance
     from mpgrasp.bench.results.reader import read_run
 
-    arguments = make_parser().parse_args(command)
     run = read_run(arguments.run)
-    given = [word for file in arguments.weights for word in ("--weights", file)]
-    plan, _ = make_plan(recorded_arguments(arguments.run, run_parser(), given))
     plan, task = _one_episode(plan, arguments)
     before = _recorded_line(arguments.run, task)
     player = Player(plan)

@@ -195,7 +195,7 @@ def make_parser() -> argparse.ArgumentParser:
         f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )
     add("--quiet", action="store_true", help="no progress, only the table")
-    parser.set_defaults(sweep=False)
+    parser.set_defaults(sweep=False, ladder=False)
     return parser
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from mpgrasp.bench.analysis.ladder import LadderCard, climbs
 from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Line
+from mpgrasp.bench.report.ladder import threshold_table
 from mpgrasp.bench.report.sweep import sweep_table
 from mpgrasp.bench.report.terminal import print_report_table, print_table, print_tests
 from mpgrasp.bench.results.trace import prune_traces
@@ -21,7 +23,12 @@ EXIT_BROKEN = 1
 
 
 def conclude(
-    directory: RunDirectory, lines: Sequence[Line], *, finished: bool, sweep: Sweep | None = None
+    directory: RunDirectory,
+    lines: Sequence[Line],
+    *,
+    finished: bool,
+    sweep: Sweep | None = None,
+    ladder: LadderCard | None = None,
 ) -> int:
     """Put the lines into their folder, write and print what they add up to.
 
@@ -30,6 +37,7 @@ def conclude(
         lines: one of each episode, in the order of the plan.
         finished: True if no episode is missing.
         sweep: whose points the suites are.
+        ladder: whose rungs they are.
 
     Returns:
         The exit code that follows from it.
@@ -52,8 +60,11 @@ def conclude(
         code = EXIT_BAD_INPUT
     finally:
         directory.close()
-    print_table(cells)
-    print_tests(tests)
+    if ladder and cells:
+        print_report_table(threshold_table(ladder, climbs(ladder, by_cells)))
+    else:
+        print_table(cells)
+        print_tests(tests)
     if sweep and cells:
         print_report_table(sweep_table(sweep, by_cells))
     print(f"Results: {directory.path}")

@@ -7,13 +7,15 @@ whatever the number of workers: a line depends on its task alone.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import EpisodeError, Games, Player, error_line, loss_note, real_games
 from mpgrasp.bench.playing.workers import WorkerPool
 from mpgrasp.bench.record import Line, Task
+from mpgrasp.detectors.runtimes import SHARED
 from mpgrasp.exceptions import ConfigError
 
 ATTEMPTS = 2
@@ -74,6 +76,24 @@ def check_engine(engine: str, workers: int, address: str | None) -> None:
         check(address)
     elif address is not None:
         raise ConfigError("--address without --engine ray", got=address, allowed="both or none")
+
+
+@contextmanager
+def shared_networks(runtime: str, engine: str) -> Iterator[None]:
+    """Have an inference server as long as the block lasts, if that is the runtime.
+
+    Raises:
+        ConfigError: with actors of Ray, which may be on other machines; or it does not start.
+    """
+    if runtime != SHARED:
+        yield
+        return
+    if engine == "ray":
+        raise ConfigError("--runtime shared with --engine ray", got=engine, allowed="--engine processes")
+    from mpgrasp.detectors.runtimes.server import inference_server
+
+    with inference_server():
+        yield
 
 
 def make_crew(

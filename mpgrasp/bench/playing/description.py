@@ -50,7 +50,7 @@ def describe(plan: Plan, player: Player, command: Sequence[str]) -> RunDescripti
             known.append((decided_by, like))
         worlds[suite.name] = like
     first = worlds[plan.suites[0].name]
-    if plan.sweep:
+    if plan.sweep or plan.ladder:
         worlds = {name: card for name, card in worlds.items() if card != first}
     return RunDescription(
         format=1,
@@ -80,6 +80,7 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         suite=plan.programme or parts[0].suite,
         suites=() if alone else parts,
         sweep=plan.sweep,
+        ladder=plan.ladder,
         episode=parts[0].episode if alone else None,
         episodes=parts[0].episodes if alone else None,
         cells=tuple(str(method) for method in plan.methods),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from mpgrasp.bench.analysis.ladder import LadderCard
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.playing.roster import Roster
 from mpgrasp.bench.record import Method, Task
@@ -77,12 +78,15 @@ class Plan:
     """Settings of what plays, by suite; in the others everybody has its own."""
     sweep: Sweep | None = None
     """Grid whose points are the suites; None for a run that is no sweep."""
+    ladder: LadderCard | None = None
+    """Ladder whose rungs the suites are; its results decide which episodes are played."""
     runtime: str = "auto"
     """Engine that computes the networks: auto, torch or openvino."""
     objects: tuple[MeshVerdict, ...] = ()
     """The verdict on every mesh that was to take the place of the suite's objects."""
     episodes: int | None = None
-    """Episodes of each cell in each suite, with `until_ci` the size of a batch; None: as a suite declares."""
+    """Episodes of each cell in each suite, with `until_ci` the size of a batch; None: as a suite declares.
+    On a ladder, those of each method on all rungs together."""
     until_ci: float | None = None
     """Batches are added until the 95 % interval of every cell is narrower than this [percentage points]."""
     max_episodes: int = 1000
@@ -158,6 +162,8 @@ class Plan:
 
     def batch(self, suite: Suite) -> int:
         """Episodes of each cell in a suite; with `until_ci` those that are added at a time."""
+        if self.ladder is not None:
+            return self.ladder.episodes
         return suite.trials if self.episodes is None else self.episodes
 
     def has(self, suite: Suite, episode: int) -> bool:
@@ -172,6 +178,8 @@ class Plan:
 
     def count(self) -> int:
         """Number of `tasks`."""
+        if self.ladder is not None:
+            return self.ladder.episodes * len(self.methods)
         return sum(map(self.count_of, self.suites))
 
     def count_of(self, suite: Suite) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpgrasp.bench.analysis.paper import Baseline
+from mpgrasp.bench.playing.ladder import lay_out_ladder
 from mpgrasp.bench.playing.plan import Plan, Shard, every_method
 from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.playing.sweep import Layout, lay_out
@@ -42,6 +43,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     for name in controllers or ():
         check_name("controller", name, controller_names())
     only = None if arguments.suites is None else tuple(arguments.suites.split(","))
+    if arguments.ladder:
+        return _ladder_plan(arguments, every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,)))
     suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
     if arguments.baseline is not None and (programme is None or controllers is not None):
         raise ConfigError(
@@ -80,6 +83,33 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         camera=arguments.camera,
         noise=not arguments.no_noise,
         shard=None if arguments.shard is None else Shard.parse(arguments.shard),
+        record=arguments.record,
+        recordings=out / "recordings",
+        traces=out / "traces",
+    )
+    return plan, out
+
+
+def _ladder_plan(arguments: argparse.Namespace, methods: tuple[Method, ...]) -> tuple[Plan, Path]:
+    """The plan of a ladder and the folder of its results."""
+    if arguments.baseline is not None or arguments.suites is not None:
+        option = "baseline" if arguments.suites is None else "suites"
+        raise ConfigError(f"a ladder with --{option}", got=getattr(arguments, option), allowed="with paper")
+    laid = lay_out_ladder(arguments, methods)
+    out = arguments.out or Path("runs") / f"{laid.card.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    detectors = tuple(dict.fromkeys(method.detector for method in methods))
+    plan = Plan(
+        suites=laid.suites,
+        programme=laid.card.name,
+        ladder=laid.card,
+        methods=methods,
+        weights=parse_weights(arguments.weights, detectors),
+        settings=laid.settings,
+        runtime=arguments.runtime,
+        episodes=arguments.episodes,
+        seed=arguments.seed,
+        camera=arguments.camera,
+        noise=not arguments.no_noise,
         record=arguments.record,
         recordings=out / "recordings",
         traces=out / "traces",

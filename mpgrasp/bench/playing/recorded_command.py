@@ -18,8 +18,8 @@ from mpgrasp.exceptions import ConfigError, OutputError
 
 PROGRAM = ("python", "-m", "mpgrasp.bench")
 """First words of a recorded command."""
-SWEEP = "sweep"
-"""Word before the suite that makes a run a sweep."""
+SWEEP, LADDER = "sweep", "ladder"
+"""Words before the suite that make a run a sweep, or one of a ladder."""
 
 
 def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str] = ()) -> Namespace:
@@ -36,11 +36,11 @@ def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str]
         OutputError: no run there, or it does not say by which command it was made.
     """
     words = _command_of(read_run(folder), folder)
-    swept = words[:1] == [SWEEP]
-    words = words[swept:]
+    swept, climbed = words[:1] == [SWEEP], words[:1] == [LADDER]
+    words = words[swept or climbed :]
     before, added = parser.parse_args(words), parser.parse_args(more)
     arguments = parser.parse_args([*words, *more])
-    arguments.sweep = swept
+    arguments.sweep, arguments.ladder = swept, climbed
     if arguments.suite is None:
         raise _no_command(folder)
     if arguments.suite.endswith(".toml"):

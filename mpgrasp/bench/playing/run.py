@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from mpgrasp.bench.analysis.summary import summarise
 from mpgrasp.bench.playing.conclusion import EXIT_BROKEN, conclude
-from mpgrasp.bench.playing.crew import Crew, check_engine, make_crew
+from mpgrasp.bench.playing.crew import Crew, check_engine, make_crew, shared_networks
 from mpgrasp.bench.playing.description import describe
+from mpgrasp.bench.playing.ladder import Ascent
 from mpgrasp.bench.playing.patience import Patience
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.planning import make_plan
@@ -35,6 +37,11 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
         raise ConfigError("workers out of range", got=arguments.workers, allowed="0 or more")
     check_engine(arguments.engine, arguments.workers, arguments.address)
     plan, out = make_plan(arguments)
+    with shared_networks(plan.runtime, arguments.engine):
+        return _run(plan, out, arguments, command)
+
+
+def _run(plan: Plan, out: Path, arguments: argparse.Namespace, command: Sequence[str]) -> int:
     player = Player(plan)  # whatever is wrong with a detector or controller shows before the first episode
     ready = player.prepare()
     if plan.objects:
@@ -79,7 +86,7 @@ def run(arguments: argparse.Namespace, command: Sequence[str]) -> int:
             code = EXIT_BAD_INPUT
     with interrupts_wait():
         lines = directory.episodes().in_order(plan.roster().place)
-        return conclude(directory, lines, finished=finished, sweep=plan.sweep) or code
+        return conclude(directory, lines, finished=finished, sweep=plan.sweep, ladder=plan.ladder) or code
 
 
 def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: RunProgress) -> bool:
@@ -93,16 +100,26 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
     progress.start(before)
     done = before.played_tasks()
     patience = Patience()
+    ascent = None if plan.ladder is None else Ascent(plan.ladder, plan.methods)
 
     def sink(line: Line) -> None:
         with interrupts_wait():
             directory.append(line)
             progress.add(line)
         patience.see(line)
+        if ascent is not None:
+            ascent.see(line)
 
     def play(tasks: Iterable[Task]) -> None:
         crew.play((task for task in tasks if task not in done), sink, progress.note)
 
+    if ascent is not None:
+        progress.expect(plan.count())
+        for line in before:
+            ascent.see(line)
+        for step in ascent.steps():
+            play(step)
+        return True
     if plan.until_ci is None:
         progress.expect(plan.count())
         play(plan.tasks())

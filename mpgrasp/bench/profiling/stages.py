@@ -22,6 +22,7 @@ STAGES: Mapping[str, tuple[str, ...]] = {
     NETWORK: (
         "mpgrasp.detectors.runtimes.torch_runtime:TorchRuntime.__call__",
         "mpgrasp.detectors.runtimes.openvino:OpenVinoRuntime.__call__",
+        "mpgrasp.detectors.runtimes.shared:SharedRuntime.__call__",
     ),
     IMAGE: ("mpgrasp.episode.episode:ask_detector",),
     RENDER: ("mpgrasp.camera.wrist_camera:WristCamera.capture",),

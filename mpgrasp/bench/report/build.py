@@ -13,6 +13,7 @@ from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.filmstrips import NO_FILMS, Films, filmstrips
 from mpgrasp.bench.report.kept_traces import NO_TRACES, read_traces
+from mpgrasp.bench.report.ladder import LadderSection, ladder_sections
 from mpgrasp.bench.report.motion_figures import SuiteMotion, motion_figures
 from mpgrasp.bench.report.orderings import Orderings, orderings, pair_table
 from mpgrasp.bench.report.outcome_figures import outcome_figures
@@ -53,6 +54,7 @@ class Report:
     counts: str
     """Numbers of what was played, in a sentence."""
     overview: Table
+    ladders: Sequence[LadderSection]
     sweeps: Sequence[SweepSection]
     by_object: Sequence[Table]
     refused_meshes: Table | None
@@ -107,6 +109,7 @@ def make_report(runs: Runs) -> Report:
         suites=list(dict.fromkeys(map(base_name, runs.suites))),
         counts=_counts_text(evaluation),
         overview=overview_table(evaluation),
+        ladders=ladder_sections(runs),
         sweeps=sweep_sections(runs),
         by_object=object_tables(evaluation),
         refused_meshes=refused_meshes_table(runs),

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from msgspec import field
 
+from mpgrasp.bench.analysis.ladder import LadderCard
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Record
 from mpgrasp.bench.results.provenance import MadeWith
@@ -89,6 +90,8 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     suites: tuple[SuitePart, ...] = ()
     sweep: Sweep | None = None
     """Grid of a sweep, whose points are the suites."""
+    ladder: LadderCard | None = None
+    """Ladder, whose rungs are the suites; its results decided which episodes were played."""
     episode: Card | None = None
     episodes: int | None = None
     cells: tuple[str, ...]

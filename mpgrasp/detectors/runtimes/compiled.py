@@ -24,6 +24,7 @@ from mpgrasp.detectors.runtimes.openvino import (
     openvino_precision,
     threads,
 )
+from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.cache import load_result, store_result
 
@@ -50,7 +51,7 @@ class CompiledNetwork:
     input: NetworkInput
     width_px: float
     """Opening that a width output of 1 stands for, in pixels of the network's image [px]."""
-    runtime: OpenVinoRuntime
+    runtime: Runtime
     weights: Path
     """The file that it was made from."""
 
@@ -102,6 +103,28 @@ def remember(weights: NetworkWeights, mark: str, runtime: OpenVinoRuntime) -> No
     if runtime.file is not None:
         note = _Note(input=asdict(weights.input), width_px=weights.width_px, file=runtime.file.name)
         store_result(_KIND, _key(weights.name, mark, runtime.settings), note)
+
+
+def made_ready(name: str, weights: Path) -> CompiledNetwork:
+    """Return a network with the fastest runtime here: as it was compiled before, or as it is compiled now.
+
+    Raises:
+        ConfigError, WeightsError: it cannot be used.
+    """
+    if runtime_name("auto").startswith("openvino"):
+        found = find(name, weights)
+        if found is not None:
+            return found
+    from mpgrasp.detectors.networks.weights import load_weights
+
+    mark = fingerprint(weights)
+    read = load_weights(name, weights)
+    ready = make_runtime(read)
+    if mark is not None and mark == fingerprint(weights) and isinstance(ready, OpenVinoRuntime):
+        remember(read, mark, ready)
+    return CompiledNetwork(
+        name=name, input=read.input, width_px=read.width_px, runtime=ready, weights=weights
+    )
 
 
 def _key(name: str, mark: str, settings: dict[str, Any]) -> str:

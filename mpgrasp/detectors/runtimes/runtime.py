@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.detectors.runtimes import RUNTIMES
+from mpgrasp.detectors.runtimes import RUNTIMES, SHARED
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
 from mpgrasp.exceptions import ConfigError
 
@@ -56,6 +56,8 @@ def check_runtime(runtime: str) -> None:
 def runtime_name(runtime: str) -> str:
     """Return the name that `make_runtime` is going to give: "openvino bf16", say. Compiles nothing."""
     check_runtime(runtime)
+    if runtime == SHARED:
+        raise ConfigError("a network that is shared comes from a weights file", got=runtime, allowed="auto")
     cuda = has_cuda()
     precision = None if runtime == "torch" or (runtime == "auto" and cuda) else openvino_precision()
     if precision is not None:

@@ -1,0 +1,1 @@
+"""Ladders: one suite made harder rung by rung, until a method fails."""

@@ -1,0 +1,165 @@
+"""Laws of thresholds: intervals hold the truth as often as they say, and are those of any scale alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from mpgrasp.exceptions import ConfigError
+from mpgrasp.thresholds import Difference, Fit, Results, Scale, difference
+
+LEVELS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6)
+STICKS = Scale(levels=LEVELS, logarithmic=True, harder="lower")
+LINE = Scale(levels=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0), harder="higher")
+
+
+def curve(middle: float, width: float, lapse: float = 0.0) -> Callable[[float], float]:
+    """Success over thickness: half at the middle, from 10 to 90 % within a width in its logarithm."""
+
+    def rate(level: float) -> float:
+        return float((1 - lapse) / (1 + np.exp(-2 * np.log(9) / width * np.log(level / middle))))
+
+    return rate
+
+
+def at(rate: float, middle: float, width: float, lapse: float = 0.0) -> float:
+    """The true threshold of such a curve."""
+    share = rate / (1 - lapse)
+    return float(middle * np.exp(np.log(share / (1 - share)) * width / (2 * np.log(9))))
+
+
+def drawn(rate: Callable[[float], float], n: int, rng: np.random.Generator) -> dict[float, tuple[int, int]]:
+    return {level: (int(rng.binomial(n, rate(level))), n) for level in LEVELS}
+
+
+@pytest.mark.parametrize("lapse", [0.0, 0.03])
+def test_a_threshold_is_found_to_within_what_many_episodes_allow(lapse: float) -> None:
+    fit = Fit(STICKS, drawn(curve(1.3, 0.8, lapse), 1000, np.random.default_rng(0)))
+    for rate in (0.5, 0.9):
+        assert fit.threshold(rate).level == pytest.approx(at(rate, 1.3, 0.8, lapse), rel=0.05)
+
+
+def test_a_threshold_is_that_of_greatest_likelihood_where_the_data_are_many() -> None:
+    counts = drawn(curve(1.7, 1.0), 3000, np.random.default_rng(1))
+    x = np.log(LEVELS)
+    k, n = np.array([*counts.values()], float).T
+
+    def loss(parameters: np.ndarray) -> float:
+        middle, width = parameters
+        p = np.clip(1 / (1 + np.exp(-2 * np.log(9) / width * (x - middle))), 1e-12, 1 - 1e-12)
+        return -float(np.sum(k * np.log(p) + (n - k) * np.log1p(-p)))
+
+    middle, _ = minimize(loss, [0.5, 1.0], method="Nelder-Mead").x
+    assert Fit(STICKS, counts).threshold(0.5).level == pytest.approx(float(np.exp(middle)), rel=0.02)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    rng, hits, trials = np.random.default_rng(2), 0, 0
+    for _ in range(150):
+        middle, width = rng.uniform(0.9, 3.0), rng.uniform(0.4, 1.5)
+        fit = Fit(STICKS, drawn(curve(middle, width, 0.01), 30, rng))
+        for rate in (0.5, 0.9):
+            found = fit.threshold(rate)
+            hits += found.low <= at(rate, middle, width, 0.01) <= found.high
+            trials += 1
+    assert 0.92 <= hits / trials <= 0.985
+
+
+def test_the_unit_of_a_level_changes_nothing_but_the_unit() -> None:
+    counts = drawn(curve(1.3, 0.8), 20, np.random.default_rng(3))
+    metres = Scale(levels=tuple(x / 1000 for x in LEVELS), logarithmic=True, harder="lower")
+    a = Fit(STICKS, counts).threshold(0.9)
+    b = Fit(metres, {x / 1000: c for x, c in counts.items()}).threshold(0.9)
+    assert np.allclose(np.array(a) / 1000, b, rtol=1e-9)
+
+
+def test_a_scale_that_gets_harder_upwards_is_the_mirror_of_one_that_gets_harder_downwards() -> None:
+    rng = np.random.default_rng(4)
+    counts = {x: (int(rng.binomial(30, 1 / (1 + np.exp(2 * (x - 2.5))))), 30) for x in LINE.levels}
+    mirror = Scale(levels=tuple(-x for x in reversed(LINE.levels)), harder="lower")
+    up = Fit(LINE, counts).threshold(0.9)
+    down = Fit(mirror, {-x: c for x, c in counts.items()}).threshold(0.9)
+    assert np.allclose([up.level, up.low, up.high], [-down.level, -down.high, -down.low], atol=1e-6)
+    assert up.low < up.level < up.high
+
+
+@pytest.mark.parametrize(("k", "side"), [(20, "harder"), (0, "easier")])
+def test_a_threshold_that_is_not_on_the_ladder_lies_beyond_its_end(k: int, side: str) -> None:
+    found = Fit(STICKS, {level: (k, 20) for level in LEVELS}).threshold(0.5)
+    assert found.level < LEVELS[0] if side == "harder" else found.level > LEVELS[-1]
+
+
+def test_rates_fall_with_the_difficulty_and_lie_within_their_bounds() -> None:
+    fit = Fit(STICKS, drawn(curve(1.3, 0.8), 20, np.random.default_rng(5)))
+    levels = np.geomspace(0.5, 5.6, 40)
+    rate, low, high = fit.rates(levels)
+    assert (np.diff(rate) >= -1e-12).all()
+    assert ((low <= rate + 1e-9) & (rate <= high + 1e-9)).all()
+    assert ((low >= 0) & (high <= 1)).all()
+
+
+def test_most_is_told_by_levels_where_nobody_knows_what_will_happen() -> None:
+    sure = {0.5: (0, 40), 0.7: (0, 40), 2.8: (40, 40), 4.0: (40, 40), 5.6: (40, 40)}
+    assert Fit(STICKS, sure).best_level((0.5, 0.9), 8) in (1.0, 1.4, 2.0)
+
+
+def worlds(rate: Callable[[float], float], n: int, rng: np.random.Generator) -> Results:
+    """Success by level and world."""
+    return {level: {k: bool(luck < rate(level)) for k, luck in enumerate(rng.random(n))} for level in LEVELS}
+
+
+def test_equal_results_do_not_differ() -> None:
+    results = worlds(curve(1.3, 0.8), 20, np.random.default_rng(6))
+    assert difference(STICKS, results, results, 0.5) == Difference(1.0, 1.0, 1.0, 1.0)
+
+
+def test_methods_that_differ_are_told_apart_and_the_quotient_is_that_of_their_levels() -> None:
+    rng = np.random.default_rng(7)
+    a, b = (worlds(curve(middle, 0.6), 40, rng) for middle in (1.2, 2.4))
+    found = difference(STICKS, a, b, 0.5)
+    assert found.p < 1e-4
+    assert found.low <= 0.5 <= found.high
+    back = difference(STICKS, b, a, 0.5)
+    assert np.allclose([back.ratio, back.low, back.high], [1 / found.ratio, 1 / found.high, 1 / found.low])
+
+
+def test_on_a_scale_without_logarithm_a_difference_is_in_its_unit() -> None:
+    def results(middle: float, seed: int) -> Results:
+        rng = np.random.default_rng(seed)
+        return {
+            x: {k: bool(rng.random() < 1 / (1 + np.exp(3 * (x - middle)))) for k in range(60)}
+            for x in LINE.levels
+        }
+
+    found = difference(LINE, results(3.5, 0), results(2.0, 1), 0.5)
+    assert found.low <= 1.5 <= found.high
+    assert found.low > 0.5
+
+
+def test_equal_methods_are_called_different_no_more_often_than_the_level_allows() -> None:
+    rng = np.random.default_rng(8)
+    alarms = 0
+    for _ in range(50):
+        a, b = (worlds(curve(1.6, 0.9), 15, rng) for _ in range(2))
+        alarms += difference(STICKS, a, b, 0.5, resamples=100).p < 0.05
+    assert alarms / 50 <= 0.12
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Scale(levels=(1.0, 2.0)), "unusable levels"),
+        (lambda: Scale(levels=(1.0, 3.0, 2.0)), "unusable levels"),
+        (lambda: Scale(levels=(1.0, float("nan"), 2.0)), "unusable levels"),
+        (lambda: Scale(levels=(0.0, 1.0, 2.0), logarithmic=True), "logarithm of a level"),
+        (lambda: Scale(levels=(0.0, 1.0, 2.0), harder="more"), "unknown direction"),
+        (lambda: Fit(STICKS, {3.0: (1, 2)}), "unknown level"),
+        (lambda: Fit(STICKS, {1.0: (3, 2)}), "impossible counts"),
+    ],
+)
+def test_what_is_no_scale_or_no_count_is_refused(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        make()
