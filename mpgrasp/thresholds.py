@@ -100,13 +100,34 @@ class Grid:
         """Return the curves for a scale: any place alike, any width alike in its logarithm."""
         rungs = scale.rungs
         span, step = float(rungs[-1] - rungs[0]), float(np.diff(rungs).min())
-        middles = np.linspace(rungs[0] - MARGIN * span, rungs[-1] + MARGIN * span, MIDDLES)
-        widths = np.geomspace(0.25 * step, span, WIDTHS)
+        middles = rungs[0] - MARGIN * span, rungs[-1] + MARGIN * span
+        return cls._spanned(middles, (0.25 * step, span), LAPSES)
+
+    @classmethod
+    def _spanned(
+        cls, middles: tuple[float, float], widths: tuple[float, float], lapses: Sequence[float]
+    ) -> Grid:
         middle, width, lapse = (
-            axis.ravel() for axis in np.meshgrid(middles, widths, np.array(LAPSES), indexing="ij")
+            axis.ravel()
+            for axis in np.meshgrid(
+                np.linspace(*middles, MIDDLES), np.geomspace(*widths, WIDTHS), np.array(lapses), indexing="ij"
+            )
         )
         # a width is the way from 10 % to 90 % of the greatest rate
         return cls(middle, 2 * np.log(9) / width, lapse, -lapse / LAPSE_SCALE)
+
+    def around(self, weights: FloatArray) -> Grid:
+        """Return a finer grid over those of the curves (g,) that are likely, for many episodes' sake."""
+        likely = weights > 1e-5 * weights.max()
+        pitch = float(np.diff(np.unique(self.middle)).min())
+        widths = 2 * np.log(9) / self.slope[likely]
+        factor = float(np.exp(np.diff(np.log(np.unique(2 * np.log(9) / self.slope))).max()))
+        middle, lapse = self.middle[likely], self.lapse[likely]
+        return self._spanned(
+            (float(middle.min()) - pitch, float(middle.max()) + pitch),
+            (float(widths.min()) / factor, float(widths.max()) * factor),
+            np.linspace(max(float(lapse.min()) - 0.01, 0.0), float(lapse.max()) + 0.01, len(LAPSES)).tolist(),
+        )
 
     def rates(self, ease: FloatArray) -> FloatArray:
         """Return success rates (g, n) at n tasks."""
@@ -150,10 +171,12 @@ class Fit:
                 raise ConfigError("unknown level", got=level, allowed=scale.levels)
             if not 0 <= successes <= trials:
                 raise ConfigError("impossible counts", got=(successes, trials), allowed="0 <= successes <= n")
-        self.scale, self._grid = scale, scale.grid
+        self.scale = scale
         ease = scale.ease([*counts])
         values = np.array([*counts.values()], float).reshape(len(counts), 2)
-        self._weights = self._grid.posteriors(ease, values[None, :, 0], values[None, :, 1])[0]
+        tally = values[None, :, 0], values[None, :, 1]
+        self._grid = scale.grid.around(scale.grid.posteriors(ease, *tally)[0])
+        self._weights = self._grid.posteriors(ease, *tally)[0]
 
     def threshold(self, rate: float) -> Threshold:
         """Return the level at which the success rate falls through `rate`."""

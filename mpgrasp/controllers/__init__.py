@@ -17,6 +17,7 @@ CONTROLLERS: dict[str, str] = {
     "mppc_robust": "mpgrasp.controllers.mppc:MppcRobust",
     "mvp_robust": "mpgrasp.controllers.mvp:MvpRobust",
     "open_loop": "mpgrasp.controllers.open_loop:OpenLoop",
+    "straight_down": "mpgrasp.controllers.straight_down:StraightDown",
 }
 """Import path of each controller; it is loaded when it is made."""
 

@@ -29,6 +29,29 @@ class NetworkDetectorConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class HeuristicConfig:
+    """Settings of the heuristic: how much stands out of the table."""
+
+    crop: int = CROP
+    """Side of the central square that is looked at [px]; smaller images are used as far as they go."""
+    deviations: float = 4.0
+    """Height over the median depth, in standard deviations of the depth, from which something stands out."""
+    min_height: float = 0.001
+    """Least height from which something stands out [m]."""
+    min_area: int = 30
+    """Least number of pixels of something, in an image of 224 px."""
+    clearance: float = 0.012
+    """Gap that is left beside an object for each finger [m]."""
+
+    def __post_init__(self) -> None:
+        lengths = self.deviations, self.min_height, self.clearance
+        if min(self.crop, self.min_area) < 1 or not all(length >= 0 for length in lengths):
+            raise ConfigError(
+                "unusable heuristic settings", got=self, allowed="crop and area from 1, others from 0"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
 class OracleConfig(HandGeometry):
     """The hand as the oracle sees it: without the play that labels for networks have.
 
