@@ -96,7 +96,7 @@ def main(command: Sequence[str]) -> int:
         _copy_files(parts, arguments.out)
         directory.settle(line for part in parts for line in part.lines)
         lines = directory.episodes().in_order(every.place)
-        code = conclude(directory, lines, finished=not missing, sweep=run.configuration.sweep)
+        code = conclude(directory, lines, run.configuration, finished=not missing)
     others = sum(entry.made_with is not None for entry in run.resumed)
     if others:
         print(

@@ -6,9 +6,13 @@ import argparse
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mpgrasp.command_line import COUNT, MOST_EPISODES, SEED, WORKERS, Parser, number, whole
 from mpgrasp.exceptions import ConfigError
+
+if TYPE_CHECKING:
+    from mpgrasp.bench.playing.recorded_command import CommandParser
 
 _EPILOG = """\
 examples:
@@ -100,8 +104,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--until-ci",
         metavar="W",
         type=number(0, 100, "percentage points", above=True),
-        help="go on in batches of N episodes until every 95 %% interval is narrower than W points "
-        "(stopping by the result makes intervals slightly too narrow)",
+        help="go on in batches of N episodes until every 95 %% interval is narrower than W points; these "
+        "intervals hold at all times at once, and are wider than those of the table",
     )
     add(
         "--max-episodes",
@@ -195,7 +199,7 @@ def make_parser() -> argparse.ArgumentParser:
         f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )
     add("--quiet", action="store_true", help="no progress, only the table")
-    parser.set_defaults(sweep=False, ladder=False)
+    parser.set_defaults(sweep=False, ladder=False, race=())
     return parser
 
 
@@ -216,7 +220,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def parse(command: Sequence[str], parser: argparse.ArgumentParser | None = None) -> argparse.Namespace:
+def parse(command: Sequence[str], parser: CommandParser | None = None) -> argparse.Namespace:
     """Arguments of a run, those of a resumed one taken from its run.json.
 
     Args:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from mpgrasp.bench.analysis.ladder import LadderCard, climbs
+from mpgrasp.bench.analysis.ladder import climbs
+from mpgrasp.bench.analysis.race import state_of
 from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
-from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Line
 from mpgrasp.bench.report.ladder import threshold_table
 from mpgrasp.bench.report.sweep import sweep_table
 from mpgrasp.bench.report.terminal import print_report_table, print_table, print_tests
+from mpgrasp.bench.results.run_card import Configuration
 from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.bench.stored_lines import by_cell
@@ -23,21 +24,15 @@ EXIT_BROKEN = 1
 
 
 def conclude(
-    directory: RunDirectory,
-    lines: Sequence[Line],
-    *,
-    finished: bool,
-    sweep: Sweep | None = None,
-    ladder: LadderCard | None = None,
+    directory: RunDirectory, lines: Sequence[Line], configuration: Configuration, *, finished: bool
 ) -> int:
     """Put the lines into their folder, write and print what they add up to.
 
     Args:
         directory: of the run; it is closed.
         lines: one of each episode, in the order of the plan.
+        configuration: of the run.
         finished: True if no episode is missing.
-        sweep: whose points the suites are.
-        ladder: whose rungs they are.
 
     Returns:
         The exit code that follows from it.
@@ -60,13 +55,15 @@ def conclude(
         code = EXIT_BAD_INPUT
     finally:
         directory.close()
-    if ladder and cells:
-        print_report_table(threshold_table(ladder, climbs(ladder, by_cells)))
+    if configuration.ladder and cells:
+        print_report_table(threshold_table(configuration.ladder, climbs(configuration.ladder, by_cells)))
     else:
         print_table(cells)
         print_tests(tests)
-    if sweep and cells:
-        print_report_table(sweep_table(sweep, by_cells))
+    if configuration.sweep and cells:
+        print_report_table(sweep_table(configuration.sweep, by_cells))
+    if configuration.race and cells:
+        print(state_of(configuration.race, cells[0].cell.suite, by_cells))
     print(f"Results: {directory.path}")
     if errors:
         print(

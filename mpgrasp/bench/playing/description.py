@@ -81,6 +81,7 @@ def configuration(plan: Plan, player: Player) -> Configuration:
         suites=() if alone else parts,
         sweep=plan.sweep,
         ladder=plan.ladder,
+        race=plan.race,
         episode=parts[0].episode if alone else None,
         episodes=parts[0].episodes if alone else None,
         cells=tuple(str(method) for method in plan.methods),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from mpgrasp.bench.analysis.ladder import LadderCard
+from mpgrasp.bench.analysis.race import RaceCard
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.playing.roster import Roster
 from mpgrasp.bench.record import Method, Task
@@ -80,6 +81,8 @@ class Plan:
     """Grid whose points are the suites; None for a run that is no sweep."""
     ladder: LadderCard | None = None
     """Ladder whose rungs the suites are; its results decide which episodes are played."""
+    race: RaceCard | None = None
+    """Two methods that play until one is known to be better."""
     runtime: str = "auto"
     """Engine that computes the networks: auto, torch or openvino."""
     objects: tuple[MeshVerdict, ...] = ()

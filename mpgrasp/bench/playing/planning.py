@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpgrasp.bench.analysis.paper import Baseline
+from mpgrasp.bench.analysis.race import RaceCard, method_named
 from mpgrasp.bench.playing.ladder import lay_out_ladder
 from mpgrasp.bench.playing.plan import Plan, Shard, every_method
 from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
@@ -24,6 +25,8 @@ from mpgrasp.suite import Suite
 if TYPE_CHECKING:
     from mpgrasp.bench.meshes.check import MeshVerdict
 
+RACE_STEP = 5
+"""Worlds between two looks at a race."""
 DETECTOR, CONTROLLER = "dhrnet", "mppc"
 """The method that plays a suite unless told otherwise."""
 
@@ -46,13 +49,16 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     if arguments.ladder:
         return _ladder_plan(arguments, every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,)))
     suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
+    race = _race(arguments, suites) if arguments.race else None
     if arguments.baseline is not None and (programme is None or controllers is not None):
         raise ConfigError(
             "--baseline says which controllers of a programme play",
             got=arguments.baseline,
             allowed=f"with {', '.join(PROGRAMMES)}, and without --controller",
         )
-    if programme is None:
+    if race is not None:
+        methods = tuple(map(method_named, arguments.race))
+    elif programme is None:
         methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
     else:
         baseline = None if arguments.baseline is None else Baseline(arguments.baseline)
@@ -76,7 +82,8 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         if laid is None
         else laid.settings,
         runtime=arguments.runtime,
-        episodes=arguments.episodes,
+        race=race,
+        episodes=arguments.episodes if race is None else race.max_episodes,
         until_ci=arguments.until_ci,
         max_episodes=arguments.max_episodes,
         seed=arguments.seed,
@@ -88,6 +95,20 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         traces=out / "traces",
     )
     return plan, out
+
+
+def _race(arguments: argparse.Namespace, suites: Sequence[Suite]) -> RaceCard:
+    """The race of a command line."""
+    if len(suites) > 1:
+        raise ConfigError("a race in several suites", got=arguments.suite, allowed="one suite")
+    first, second = arguments.race
+    for name in (first, second):
+        method = method_named(name)
+        check_name("detector", method.detector, detector_names())
+        check_name("controller", method.controller, controller_names())
+    return RaceCard(
+        first=first, second=second, alpha=arguments.alpha, max_episodes=arguments.max_episodes, step=RACE_STEP
+    )
 
 
 def _ladder_plan(arguments: argparse.Namespace, methods: tuple[Method, ...]) -> tuple[Plan, Path]:

@@ -7,9 +7,10 @@ for from the folders above the run, of which the directory that it was typed in 
 from __future__ import annotations
 
 import shlex
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from mpgrasp.bench.meshes.files import YCB
 from mpgrasp.bench.results.reader import read_run
@@ -18,11 +19,21 @@ from mpgrasp.exceptions import ConfigError, OutputError
 
 PROGRAM = ("python", "-m", "mpgrasp.bench")
 """First words of a recorded command."""
-SWEEP, LADDER = "sweep", "ladder"
-"""Words before the suite that make a run a sweep, or one of a ladder."""
+SWEEP, LADDER, RACE = "sweep", "ladder", "race"
+"""Words before the others that make a run a sweep, one of a ladder, or a race."""
 
 
-def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str] = ()) -> Namespace:
+class CommandParser(Protocol):
+    """Reader of a run's command line."""
+
+    prog: str
+
+    def parse_args(self, words: Sequence[str], /) -> Namespace:
+        """Return the arguments that words mean."""
+        ...
+
+
+def recorded_arguments(folder: Path, parser: CommandParser, more: Sequence[str] = ()) -> Namespace:
     """Arguments of the command that a run was made with, with paths that lead to its files from here.
 
     Args:
@@ -36,11 +47,15 @@ def recorded_arguments(folder: Path, parser: ArgumentParser, more: Sequence[str]
         OutputError: no run there, or it does not say by which command it was made.
     """
     words = _command_of(read_run(folder), folder)
-    swept, climbed = words[:1] == [SWEEP], words[:1] == [LADDER]
-    words = words[swept or climbed :]
+    kind = words[0] if words and words[0] in (SWEEP, LADDER, RACE) else ""
+    words = words[bool(kind) :]
+    if (kind == RACE) != hasattr(parser, "race"):
+        raise ConfigError(
+            "a race is resumed as a race, and nothing else is", got=str(folder), allowed="race --resume DIR"
+        )
     before, added = parser.parse_args(words), parser.parse_args(more)
     arguments = parser.parse_args([*words, *more])
-    arguments.sweep, arguments.ladder = swept, climbed
+    arguments.sweep, arguments.ladder = kind == SWEEP, kind == LADDER
     if arguments.suite is None:
         raise _no_command(folder)
     if arguments.suite.endswith(".toml"):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from mpgrasp.anytime import confidence_sequence
+from mpgrasp.bench.analysis.race import RaceCard, state_of
 from mpgrasp.bench.analysis.summary import summarise
 from mpgrasp.bench.playing.conclusion import EXIT_BROKEN, conclude
 from mpgrasp.bench.playing.crew import Crew, check_engine, make_crew, shared_networks
@@ -18,6 +20,7 @@ from mpgrasp.bench.playing.player import EpisodeError, Player
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.bench.report.terminal import RunProgress
 from mpgrasp.bench.results.writer import RunDirectory
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.processes import interrupts_wait
@@ -86,7 +89,7 @@ def _run(plan: Plan, out: Path, arguments: argparse.Namespace, command: Sequence
             code = EXIT_BAD_INPUT
     with interrupts_wait():
         lines = directory.episodes().in_order(plan.roster().place)
-        return conclude(directory, lines, finished=finished, sweep=plan.sweep, ladder=plan.ladder) or code
+        return conclude(directory, lines, content.configuration, finished=finished) or code
 
 
 def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: RunProgress) -> bool:
@@ -120,6 +123,10 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
         for step in ascent.steps():
             play(step)
         return True
+    if plan.race is not None:
+        progress.expect(plan.count())
+        _race(plan, plan.race, directory, play)
+        return True
     if plan.until_ci is None:
         progress.expect(plan.count())
         play(plan.tasks())
@@ -131,7 +138,13 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
             start, stop = stop, min(stop + plan.batch(suite), plan.max_episodes)
             progress.expect(expected + stop * len(plan.methods))
             play(plan.tasks_of(suite, start, stop))
-            narrow = _narrow(plan, suite, directory.episodes(), stop)
+            widths = _intervals(plan, suite, directory.episodes(), stop)
+            narrow = all(100 * (high - low) < plan.until_ci for low, high in widths.values())
+        for method, (low, high) in widths.items():
+            progress.note(
+                f"{suite.name}, {method}: {100 * low:.1f} to {100 * high:.1f} % by an interval that holds at "
+                "all times at once, so that one may stop by it"
+            )
         if not narrow:
             progress.note(
                 f"{plan.max_episodes} episodes of each combination have not brought every interval of "
@@ -139,6 +152,18 @@ def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: Run
             )
         expected += stop * len(plan.methods)
     return True
+
+
+def _race(
+    plan: Plan, race: RaceCard, directory: RunDirectory, play: Callable[[Iterable[Task]], None]
+) -> None:
+    """Play worlds until one method is known to be better."""
+    (suite,) = plan.suites
+    for start in range(0, race.max_episodes, race.step):
+        stop = min(start + race.step, race.max_episodes)
+        play(plan.tasks_of(suite, start, stop))
+        if state_of(race, suite.name, by_cell(directory.episodes()), stop).decided:
+            return
 
 
 def _refuse_others(plan: Plan, directory: RunDirectory, lines: Iterable[Line]) -> None:
@@ -157,9 +182,8 @@ def _refuse_others(plan: Plan, directory: RunDirectory, lines: Iterable[Line]) -
         )
 
 
-def _narrow(plan: Plan, suite: Suite, lines: Iterable[Line], stop: int) -> bool:
-    """True if the first `stop` episodes of a suite leave no cell's interval as wide as `until_ci`."""
-    assert plan.until_ci is not None
+def _intervals(plan: Plan, suite: Suite, lines: Iterable[Line], stop: int) -> dict[str, tuple[float, float]]:
+    """Confidence sequence of each method of a suite by its first `stop` episodes; (0, 1) without one."""
     cells = summarise(line for line in lines if line.suite == suite.name and line.episode < stop)
-    widths = [100 * (cell.wilson_high - cell.wilson_low) for cell in cells]
-    return len(widths) == len(plan.methods) and max(widths) < plan.until_ci
+    found = {str(cell.cell.method): confidence_sequence(cell.successes, cell.n) for cell in cells}
+    return {str(method): found.get(str(method), (0.0, 1.0)) for method in plan.methods}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mpgrasp.bench.analysis.hypotheses import evaluate
 from mpgrasp.bench.analysis.paper import Baseline
+from mpgrasp.bench.analysis.race import state_of
 from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.filmstrips import NO_FILMS, Films, filmstrips
@@ -36,6 +37,7 @@ from mpgrasp.bench.report.tables import (
 )
 from mpgrasp.bench.report.thickness import ThinObjects, thin_objects
 from mpgrasp.bench.results.runs import Runs, find_runs
+from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.exceptions import OutputError
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.suite import base_name
@@ -54,6 +56,8 @@ class Report:
     counts: str
     """Numbers of what was played, in a sentence."""
     overview: Table
+    races: Sequence[str]
+    """How each race ended."""
     ladders: Sequence[LadderSection]
     sweeps: Sequence[SweepSection]
     by_object: Sequence[Table]
@@ -109,6 +113,7 @@ def make_report(runs: Runs) -> Report:
         suites=list(dict.fromkeys(map(base_name, runs.suites))),
         counts=_counts_text(evaluation),
         overview=overview_table(evaluation),
+        races=_races(runs),
         ladders=ladder_sections(runs),
         sweeps=sweep_sections(runs),
         by_object=object_tables(evaluation),
@@ -131,6 +136,15 @@ def make_report(runs: Runs) -> Report:
         card=card_tables(runs),
         card_differences=card_differences(runs),
     )
+
+
+def _races(runs: Runs) -> list[str]:
+    return [
+        f"{cell.suite}: {state_of(run.configuration.race, cell.suite, by_cell(run.lines))}."
+        for run in runs.runs
+        if run.configuration.race is not None
+        for cell in list(by_cell(run.lines))[:1]
+    ]
 
 
 def _counts_text(evaluation: Evaluation) -> str:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from msgspec import field
 
 from mpgrasp.bench.analysis.ladder import LadderCard
+from mpgrasp.bench.analysis.race import RaceCard
 from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.record import Record
 from mpgrasp.bench.results.provenance import MadeWith
@@ -92,6 +93,8 @@ class Configuration(Record, frozen=True, kw_only=True, omit_defaults=True):
     """Grid of a sweep, whose points are the suites."""
     ladder: LadderCard | None = None
     """Ladder, whose rungs are the suites; its results decided which episodes were played."""
+    race: RaceCard | None = None
+    """Two methods that played until one was known to be better."""
     episode: Card | None = None
     episodes: int | None = None
     cells: tuple[str, ...]

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from bench_runs import same_results, thin_command
 
+from mpgrasp.anytime import confidence_sequence
 from mpgrasp.bench.__main__ import main
 
 
@@ -17,8 +18,14 @@ def cells_of(out: Path) -> list[dict[str, Any]]:
     return cells
 
 
+def width(cell: dict[str, Any]) -> float:
+    """Width of the confidence sequence of a cell."""
+    low, high = confidence_sequence(cell["successes"], cell["n"])
+    return high - low
+
+
 def test_batches_are_added_until_every_interval_is_narrow_enough_and_no_longer(
-    fake_world: object, tmp_path: Path
+    fake_world: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "until"
     assert main(thin_command(out, "--until-ci", "30", episodes=5)) == 0
@@ -26,10 +33,11 @@ def test_batches_are_added_until_every_interval_is_narrow_enough_and_no_longer(
     assert len(sizes) == 1
     (n,) = sizes
     assert n % 5 == 0
-    assert all(cell["wilson_high"] - cell["wilson_low"] < 0.30 for cell in cells_of(out))
+    assert all(width(cell) < 0.30 for cell in cells_of(out))
+    assert "by an interval that holds at all times at once" in capsys.readouterr().err
     shorter = tmp_path / "shorter"
     assert main(thin_command(shorter, episodes=n - 5)) == 0
-    assert any(cell["wilson_high"] - cell["wilson_low"] >= 0.30 for cell in cells_of(shorter))
+    assert any(width(cell) >= 0.30 for cell in cells_of(shorter))
 
 
 def test_a_cap_ends_what_would_never_be_narrow_enough(
