@@ -38,6 +38,7 @@ demo: venv gl
 	rm -rf out/demo
 	$(BIN)/python -m mpgrasp.bench thin --controller mppc --episodes 5 --record 1 --out out/demo
 	@echo 'Watch it: $(BIN)/rerun out/demo/recordings/*.rrd, or open the GIF or the MP4 beside it.'
+	@echo 'Read it: out/demo/report.html'
 
 test: venv gl
 	$(BIN)/ruff check .
