@@ -4,8 +4,8 @@
 
 Simulates methods whose success over the rungs of `thickness` is known: half at a level between 0.9 and 3 mm,
 from 10 to 90 % within a factor between 1.35 and 4.5, failing 0, 1 or 3 % of the time however easy it is. Each
-climbs the ladder as a real one would, rungs chosen by its own results. Counted is how often the 95 % interval of
-the levels at 50 and at 90 % holds the true level, and the error is told in rungs.
+climbs the ladder as a real one would, rungs chosen by its own results. Counted is how often the 95 % interval
+of the levels at 50 and at 90 % holds the true level, and the error is told in rungs.
 """
 
 from __future__ import annotations
