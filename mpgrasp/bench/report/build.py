@@ -13,6 +13,7 @@ from mpgrasp.bench.analysis.race import state_of
 from mpgrasp.bench.report.document import Figure, Table
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.filmstrips import NO_FILMS, Films, filmstrips
+from mpgrasp.bench.report.glance import Glance, glance
 from mpgrasp.bench.report.kept_traces import NO_TRACES, read_traces
 from mpgrasp.bench.report.ladder import LadderSection, ladder_sections
 from mpgrasp.bench.report.motion_figures import SuiteMotion, motion_figures
@@ -55,6 +56,7 @@ class Report:
     """Names without the points of a sweep."""
     counts: str
     """Numbers of what was played, in a sentence."""
+    glance: Glance | None
     overview: Table
     races: Sequence[str]
     """How each race ended."""
@@ -112,6 +114,7 @@ def make_report(runs: Runs) -> Report:
     return Report(
         suites=list(dict.fromkeys(map(base_name, runs.suites))),
         counts=_counts_text(evaluation),
+        glance=glance(evaluation),
         overview=overview_table(evaluation),
         races=_races(runs),
         ladders=ladder_sections(runs),

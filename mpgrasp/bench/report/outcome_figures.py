@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping, Sequence
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +14,7 @@ from mpgrasp.bench.report.document import Figure
 from mpgrasp.bench.report.evaluation import Evaluation
 from mpgrasp.bench.report.intervals import rate_text
 from mpgrasp.bench.report.names import name_of
-from mpgrasp.bench.report.svg import BAD, GOOD, INK, OTHER, legend_above, svg
+from mpgrasp.bench.report.svg import BAD, GOOD, INK, OTHER, legend_above, name_rows, svg
 from mpgrasp.statistics import wilson_interval
 
 if TYPE_CHECKING:
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
 DRAWN = 1000
 """Successes, and failures, of a cell that have a mark of their own in a figure."""
-_LABEL = 24  # characters of a row's name in a line
 
 Rate = tuple[float, float, float]
 """A success rate with the bounds of its interval, 0 to 1."""
@@ -91,7 +89,7 @@ def success_plot(bars: Sequence[Bar], alt: str) -> str:
             if paper:
                 first = not any(before for _, _, before in bars[:k])
                 _interval(axes, k + 0.3, paper, "D", OTHER, "paper" if first else None)
-        _rows(axes, [label for label, _, _ in bars])
+        name_rows(axes, [label for label, _, _ in bars])
         axes.set(xlim=(-2, 102), xlabel="success [%], with 95 % Wilson intervals")
         legend_above(canvas)
 
@@ -127,7 +125,7 @@ def time_plot(times: Mapping[str, Times], alt: str) -> str:
                         mew=0.8,
                         zorder=3,
                     )
-        _rows(axes, list(times))
+        name_rows(axes, list(times))
         axes.set(xlabel="simulated time [s]")
         longest = max(max(values) for pair in times.values() for values in pair if values)
         axes.set_xlim(0, 1.05 * longest or 1.0)  # with room for the last tick's label
@@ -140,12 +138,3 @@ def _interval(axes: Axes, row: float, values: Rate, marker: str, colour: str, na
     rate, low, high = (100 * value for value in values)
     bars = np.maximum([[rate - low], [high - rate]], 0)
     axes.errorbar(rate, row, xerr=bars, fmt=marker, ms=5, capsize=3, lw=1.4, color=colour, label=name)
-
-
-def _rows(axes: Axes, labels: Sequence[str]) -> None:
-    """One row per label, the first on top; long names are folded, to leave room for what is drawn."""
-    axes.set_yticks(range(len(labels)), ["\n".join(wrap(label, _LABEL)) for label in labels])
-    for text in axes.get_yticklabels():
-        text.set_fontsize(7.5 if "\n" in text.get_text() else 9.5)
-    axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.grid(axis="y", visible=False)

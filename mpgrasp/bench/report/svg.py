@@ -9,10 +9,12 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
 WIDTH = 4.6
@@ -22,6 +24,7 @@ GOOD, BAD, OTHER = "#2a7fce", "#d9622b", "#8a8f98"
 INK = "#010203"
 """Stands for the page's ink until the SVG is written."""
 
+_LABEL = 24  # characters of a row's name in a line
 _STYLE = {
     "font.size": 9.5,
     "font.family": "DejaVu Sans",
@@ -81,3 +84,12 @@ def legend_above(canvas: Canvas, columns: int = 3) -> None:
     if found:
         ncols = columns if max(map(len, found)) < 30 else 1
         canvas.legend(list(found.values()), list(found), loc="outside upper center", ncols=ncols)
+
+
+def name_rows(axes: Axes, labels: Sequence[str]) -> None:
+    """Give a row to each label, the first on top; long names are folded, to leave room for what is drawn."""
+    axes.set_yticks(range(len(labels)), ["\n".join(wrap(label, _LABEL)) for label in labels])
+    for text in axes.get_yticklabels():
+        text.set_fontsize(7.5 if "\n" in text.get_text() else 9.5)
+    axes.set_ylim(len(labels) - 0.4, -0.6)
+    axes.grid(axis="y", visible=False)

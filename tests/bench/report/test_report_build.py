@@ -204,12 +204,36 @@ def test_singular_stops_stand_in_brackets_behind_all(tmp_path: Path) -> None:
     assert [row[column] for row in motion[1:]] == ["3 (2)", "0"]
 
 
-def test_without_card_and_pairs_the_report_says_so(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", lines("10"))
+def test_sections_that_have_nothing_to_show_are_left_out(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", lines("11"))
     write_report([run], run)
     text = (run / "report.md").read_text()
-    assert "has no physics card" in text
-    assert "No two cells of one suite" in text
+    found = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert found[0] == "Results"
+    assert {"Runs", "Success and time"} <= set(found)
+    missing = {
+        "Physics card",
+        "Paired tests",
+        "Failures",
+        "The paper's orderings",
+        "Ladders",
+        "Race",
+        "Sweep",
+    }
+    assert not missing & set(found)
+
+
+def test_a_report_opens_with_all_rates_in_one_picture_and_a_verdict(tmp_path: Path) -> None:
+    cells = [*lines("1" * 30), *lines("1" * 12 + "0" * 18, controller="straight_down")]
+    run = make_run(tmp_path / "run", cells)
+    write_report([run], run)
+    text = (run / "report.md").read_text()
+    assert text.index("success with 95 % intervals") < text.index("Suites: 1, cells: 2")
+    assert "thin: DHRNet + MP-PC succeeds in 30/30" in text
+    assert "significantly more than 1 of 1 others." in text
+    page = (run / "report.html").read_text()
+    assert "floor: nothing learned" in page
+    assert "ceiling: knows the truth" not in page
 
 
 def test_without_traces_the_report_gives_the_commands_that_make_them(tmp_path: Path) -> None:
@@ -226,8 +250,8 @@ def test_without_traces_the_report_gives_the_commands_that_make_them(tmp_path: P
         ["thin", "DHRNet + MVP", "failure", "0", replay.format(0, "mvp")],
     ]
     assert "No episode to show: thin: DHRNet + MVP, success." in text
-    # the figures of rates and times, and no empty ones
-    assert page.tags.count("svg") == page.tags.count("figure") == 2
+    # all rates at a glance, the figures of rates and times, and no empty ones
+    assert page.tags.count("svg") == page.tags.count("figure") == 3
     assert "img" not in page.tags
 
 
