@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mpgrasp.camera.other_sensors import flying_pixels, lost_patches, multipath
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.linear_algebra import norm
@@ -51,6 +52,14 @@ class DepthNoise:
     """Time over which it changes into another pattern [s]; 0 = never."""
     multiplicative: float = 0.0
     """Stress mode, not a D435: standard deviation of white noise that multiplies the depth [-]."""
+    multipath: float = 0.0
+    """Another camera, time of flight: error of what lies below its surroundings, over that depth [-]."""
+    flying: float = 0.0
+    """Another camera, time of flight: share of the pixels at edges that lie between both sides [0, 1]."""
+    dropout: float = 0.0
+    """Another camera, of projected patterns: share of the pixels that each frame loses in patches [0, 1)."""
+    dropout_px: float = 3.0
+    """Standard deviation of the Gaussian that makes these patches [px]."""
 
     def __post_init__(self) -> None:
         for name in ("baseline", "focal_px"):
@@ -65,9 +74,16 @@ class DepthNoise:
             "fixed_pattern",
             "pattern_px",
             "pattern_time",
+            "multipath",
+            "dropout_px",
         ):
             if not 0 <= getattr(self, name) < np.inf:
                 raise ConfigError(f"{name} of the depth sensor", got=getattr(self, name), allowed="0 or more")
+        for name, most in (("flying", 1.0), ("dropout", 0.95)):
+            if not 0 <= getattr(self, name) <= most:
+                raise ConfigError(
+                    f"{name} of the depth sensor", got=getattr(self, name), allowed=f"0 to {most}"
+                )
         if not 0 < self.max_incidence <= np.pi / 2:
             raise ConfigError("max_incidence", got=self.max_incidence, allowed="above 0, up to pi/2 [rad]")
 
@@ -101,6 +117,8 @@ def apply(
     Returns:
         (H, W) z-depth [m], a new array.
     """
+    if noise.multipath > 0:
+        depth = multipath(depth, noise.multipath)
     scale = intrinsics.fx / noise.focal_px
     fb = np.float32(noise.focal_px * noise.baseline)
     disparity = fb / depth
@@ -116,11 +134,15 @@ def apply(
         measured: NDArray[np.float32] = np.divide(fb, error, out=error)
     if noise.multiplicative > 0:
         measured *= 1 + np.float32(noise.multiplicative) * white_noise(depth.shape, rng)
+    if noise.flying > 0:
+        measured = flying_pixels(measured, noise.flying, rng)
     lost = ~((measured >= noise.min_z) & np.isfinite(measured))
     if noise.shadows:
         lost |= _shadows(disparity * np.float32(scale))
     if noise.max_incidence < np.pi / 2:
         lost |= _grazing(depth, intrinsics, noise.max_incidence)
+    if noise.dropout > 0:
+        lost |= lost_patches(correlated_noise(depth.shape, noise.dropout_px, rng), noise.dropout)
     measured[lost] = np.nan
     return measured
 

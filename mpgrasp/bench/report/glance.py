@@ -79,13 +79,14 @@ def _verdict(evaluation: Evaluation, suite: str, shown: Sequence[CellSummary]) -
     of_suite = [row for row in shown if row.cell.suite == suite]
     methods = [row for row in of_suite if _kind(evaluation, row) == "method"] or of_suite
     best = max(methods, key=lambda row: row.rate or 0)
-    said = f"{suite}: {name_of(best.cell.method)} succeeds in {rate_text(best.successes, best.n)}"
+    rate = rate_text(best.successes, best.n)
+    said = f"{suite}: {name_of(best.cell.method)} succeeds in {rate}"
+    if len(methods) > 1:
+        said += f", the most of {len(methods)} methods"
     others = [row.cell.method for row in of_suite if row.cell != best.cell]
     if not others:
         return said + "."
     worse, better = _significant(evaluation, suite, best.cell.method)
-    if len(methods) > 1:
-        said += ", more than the other methods or as much"
     said += f"; significantly more than {worse} of {len(others)} others"
     return said + (f", and less than {better}." if better else ".")
 
@@ -109,7 +110,7 @@ def _plot(rows: Sequence[_Row], alt: str) -> str:
             low, high = 100 * found.wilson_low, 100 * found.wilson_high
             axes.plot([low, high], [k, k], color=colour, lw=2, solid_capstyle="round")
             label = None if row.kind in drawn else _NAMES[row.kind]
-            axes.plot(100 * (found.rate or 0), k, "o", ms=7, color=colour, label=label)
+            axes.plot(100 * (found.rate or 0), k, "o", ms=7, color=colour, label=label, clip_on=False)
             drawn.add(row.kind)
         name_rows(axes, [row.label for row in rows])
         axes.set(xlim=(-2, 102), xlabel="success [%]")

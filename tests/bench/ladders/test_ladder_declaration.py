@@ -30,7 +30,7 @@ def test_a_ladder_has_rungs_of_its_own_over_the_same_worlds(name: str) -> None:
 
 def test_six_ladders_and_more_ship() -> None:
     assert {
-        "thickness", "cloth", "calibration", "noise", "latency", "search", "clutter", "size",
+        "thickness", "cloth", "calibration", "noise", "latency", "search", "clutter", "size", "transfer",
     } <= set(ladder_names())  # fmt: skip
 
 
