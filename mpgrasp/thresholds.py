@@ -79,6 +79,11 @@ class Scale:
         """How easy the levels are, from the hardest to the easiest."""
         return np.sort(self.ease(self.levels))
 
+    @property
+    def by_ease(self) -> tuple[float, ...]:
+        """The levels as they were given, from the hardest to the easiest."""
+        return self.levels if self.harder == "lower" else self.levels[::-1]
+
     @cached_property
     def grid(self) -> Grid:
         """Parameters of the curves that may be."""
@@ -215,7 +220,7 @@ class Fit:
             after = joint / np.maximum(mass, 1e-300)[:, None]
             variance = sum(after @ place**2 - (after @ place) ** 2 for place in places)
             expected.append(float(mass @ variance))
-        return float(self.scale.level(float(rungs[int(np.argmin(expected))])))
+        return self.scale.by_ease[int(np.argmin(expected))]
 
     def _bounds(self) -> tuple[float, float]:
         rungs = self.scale.rungs

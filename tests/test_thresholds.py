@@ -106,6 +106,17 @@ def test_most_is_told_by_levels_where_nobody_knows_what_will_happen() -> None:
     assert Fit(STICKS, sure).best_level((0.5, 0.9), 8) in (1.0, 1.4, 2.0)
 
 
+@pytest.mark.parametrize("harder", ["higher", "lower"])
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_the_best_level_is_one_of_those_given_bit_for_bit(harder: str, logarithmic: bool) -> None:
+    levels = (0.1, 0.13, 0.3, 0.7, 1.2, 3.3, 7.7)  # of which exp(log(x)) is not always x
+    scale = Scale(levels=levels, logarithmic=logarithmic, harder=harder)
+    for k in range(len(levels)):
+        hard = {x: (0, 9) if (x > levels[k]) == (harder == "higher") else (9, 9) for x in levels}
+        assert Fit(scale, hard).best_level((0.5, 0.9), 4) in levels
+    assert np.all(np.diff(scale.ease(scale.by_ease)) > 0)
+
+
 def worlds(rate: Callable[[float], float], n: int, rng: np.random.Generator) -> Results:
     """Success by level and world."""
     return {level: {k: bool(luck < rate(level)) for k, luck in enumerate(rng.random(n))} for level in LEVELS}
