@@ -1,0 +1,1 @@
+"""Evaluation of detectors on real datasets: `python -m mpgrasp.evaluate cornell|jacquard PATH`."""
