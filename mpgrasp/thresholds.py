@@ -9,13 +9,13 @@ psignifit does the same and is under the GPL; a maximum-likelihood fit has no in
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
@@ -32,6 +32,8 @@ MARGIN = 0.5
 
 Counts = Mapping[float, tuple[int, int]]
 """Successes and trials by level."""
+Results = Mapping[float, Mapping[int, bool]]
+"""Success by level and world."""
 
 
 class Threshold(NamedTuple):
@@ -236,9 +238,7 @@ def _within(scale: Scale, ease: float) -> float:
 
 
 def _binomials(n: int) -> FloatArray:
-    from math import comb
-
-    return np.array([comb(n, k) for k in range(n + 1)], float)
+    return np.array([math.comb(n, k) for k in range(n + 1)], float)
 
 
 def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
@@ -247,83 +247,3 @@ def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) 
     summed = np.cumsum(weights[:, order], axis=1)
     places = [np.minimum((summed < share).sum(axis=1), len(values) - 1) for share in shares]
     return np.array([values[order][place] for place in places])
-
-
-class Difference(NamedTuple):
-    """Threshold of one method and that of another, over worlds that both met."""
-
-    ratio: float
-    """Of the levels, first over second, on a logarithmic scale; else the first minus the second."""
-    low: float
-    high: float
-    """Bounds of its 95 % interval."""
-    p: float
-    """Two-sided: how rare so large a difference is among resampled worlds, if there is none."""
-
-
-Results = Mapping[float, Mapping[int, bool]]
-"""Success by level and world."""
-
-
-def difference(
-    scale: Scale, first: Results, second: Results, rate: float, *, resamples: int = 1000, seed: int = 0
-) -> Difference:
-    """Compare the levels at which two methods fall through a success rate.
-
-    Worlds are resampled, the same for both methods and at all levels; thresholds beyond the ladder count as
-    at its ends, which makes a difference smaller and never larger.
-
-    Args:
-        scale: of the levels.
-        first: results of a method.
-        second: results of the other one.
-        rate: success rate.
-        resamples: number of times that worlds are drawn.
-        seed: of the drawing.
-    """
-    worlds = sorted({world for of in (first, second) for results in of.values() for world in results})
-    rng = np.random.default_rng(seed)
-    drawn = rng.multinomial(len(worlds), np.full(len(worlds), 1 / len(worlds)), size=resamples)
-    weights = np.vstack([np.ones(len(worlds)), drawn.astype(float)])
-    ends = scale.rungs[0], scale.rungs[-1]
-    found = [np.clip(_eases(scale, of, worlds, weights, rate), *ends) for of in (first, second)]
-    gaps = found[0] - found[1]
-    spread = float(np.std(gaps[1:], ddof=1))
-    gap = float(gaps[0])
-    return Difference(*_told(scale, gap, gap - 1.96 * spread, gap + 1.96 * spread), p=_two_sided(gap, spread))
-
-
-def _two_sided(gap: float, spread: float) -> float:
-    from math import erfc, sqrt
-
-    if gap == 0:
-        return 1.0
-    return erfc(abs(gap) / spread / sqrt(2)) if spread > 0 else 0.0
-
-
-def _told(scale: Scale, *gaps: float) -> tuple[float, float, float]:
-    """A gap of ease and its bounds, as a ratio or a difference of levels."""
-    signed = gaps if scale.harder == "lower" else (-gaps[0], -gaps[2], -gaps[1])
-    value, low, high = (float(np.exp(g)) if scale.logarithmic else float(g) for g in signed)
-    return value, low, high
-
-
-def _eases(
-    scale: Scale, results: Results, worlds: Sequence[int], weights: NDArray[np.float64], rate: float
-) -> FloatArray:
-    """Median threshold (b,) for b rows of weights of the worlds."""
-    place = {world: k for k, world in enumerate(worlds)}
-    levels = [level for level in results if results[level]]
-    successes = np.zeros((len(weights), len(levels)))
-    trials = np.zeros_like(successes)
-    for k, level in enumerate(levels):
-        of_level = weights[:, [place[world] for world in results[level]]]
-        trials[:, k] = of_level.sum(axis=1)
-        successes[:, k] = of_level @ np.array([*results[level].values()], float)
-    grid, ease = scale.grid, scale.ease(levels)
-    parts = []
-    for start in range(0, len(weights), 100):
-        part = np.s_[start : start + 100]
-        posteriors = grid.posteriors(ease, successes[part], trials[part])
-        parts.append(quantiles(grid.ease_at(rate), posteriors, (0.5,))[0])
-    return np.concatenate(parts)

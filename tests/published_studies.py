@@ -10,6 +10,11 @@ from typing import Any
 
 from published_runs import NAMES, RESULTS, Share, entry, share
 
+from mpgrasp.bench.analysis.ladder import Climb, LadderCard, climbs, comparisons
+from mpgrasp.bench.results.reader import read_run
+from mpgrasp.bench.results.writer import RunDirectory
+from mpgrasp.bench.stored_lines import by_cell
+
 
 @cache
 def study(folder: str) -> Any:
@@ -256,3 +261,55 @@ def workers(engine: str, number: int) -> dict[str, float]:
 def step_of(environment: str) -> float:
     """Return the CPU time of a usual step [ms]."""
     return float(entry(study("environments")["rows"], environment=environment)["median_ms"])
+
+
+@cache
+def _ladder(name: str) -> tuple[LadderCard, list[Climb]]:
+    folder = RESULTS / "ladders" / name
+    card = read_run(folder).configuration.ladder
+    assert card is not None
+    return card, climbs(card, by_cell(RunDirectory(folder).episodes()))
+
+
+def level(detector: str, column: str) -> list[float]:
+    """Return the level of a column such as "cloth, mm, 90 %" and its interval; the last rung beyond it."""
+    name, _, rate = (word.strip() for word in column.split(","))
+    card, found = _ladder(name)
+    (climb,) = (c for c in found if c.method.detector == detector)
+    threshold = climb.thresholds[0 if rate == "90 %" else 1]
+    ease, rungs = float(card.scale.ease([threshold.level])[0]), card.scale.rungs
+    if not rungs[0] <= ease <= rungs[-1]:
+        return [card.scale.by_ease[0 if ease < rungs[0] else -1]]
+    return list(threshold)
+
+
+@cache
+def _comparisons(name: str) -> dict[tuple[str, str, float], Any]:
+    card, found = _ladder(name)
+    return {(c.first.detector, c.second.detector, c.rate): c for c in comparisons(card.scale, found)}
+
+
+def p_of_levels(ladder: str, first: str, second: str, rate: float = 0.5) -> float:
+    """Return the corrected p of two detectors on a ladder."""
+    found = _comparisons(ladder)
+    return float((found.get((first, second, rate)) or found[second, first, rate]).p_holm)
+
+
+def significant(ladder: str, *detectors: str) -> int:
+    """Return how many differences of two detectors, at 90 and at 50 %, are significant."""
+    return sum(
+        row.p_holm < 0.05
+        for (first, second, _), row in _comparisons(ladder).items()
+        if not detectors or {first, second} <= set(detectors)
+    )
+
+
+def coverage(rate: float) -> tuple[float, float, float]:
+    """Return the share of intervals that hold the truth, with its own interval [%]."""
+    held = entry(study("ladder-coverage")["rows"], rate=rate)["coverage"]
+    return share(held["count"], held["n"])
+
+
+def ladder_error(rate: float) -> float:
+    """Return the error of a level of simulated methods [rungs]."""
+    return float(entry(study("ladder-coverage")["rows"], rate=rate)["error_rungs"])

@@ -19,7 +19,7 @@ PACKAGE = Path(mpgrasp.__file__).parent
 ORDER = (
     "exceptions", "names", "forking", "processes", "foreign_code",
     "linear_algebra", "geometry", "paths", "outcome", "workspace",
-    "files", "command_line", "statistics", "anytime", "thresholds",
+    "files", "command_line", "statistics", "anytime", "thresholds", "threshold_difference",
     "readings", "depth", "height_map", "grasp",
     "robot", "camera",
     "scene.objects", "scene",

@@ -7,7 +7,8 @@ from itertools import combinations
 
 from mpgrasp.bench.record import Cell, Cells, Method, Record, played
 from mpgrasp.statistics import holm
-from mpgrasp.thresholds import Difference, Fit, Results, Scale, Threshold, difference
+from mpgrasp.threshold_difference import Difference, difference
+from mpgrasp.thresholds import Fit, Results, Scale, Threshold
 
 RATES = (0.9, 0.5)
 """Success rates whose levels are told, the one that is met first on the way up before the other."""

@@ -109,6 +109,8 @@ def write_report(folders: Sequence[Path], out: Path) -> Path:
 def make_report(runs: Runs) -> Report:
     """The report on some runs, as text, numbers and figures."""
     evaluation = Evaluation.of(runs)
+    ladders = (run.configuration.ladder for run in runs.runs)
+    rungs = {point for card in ladders if card is not None for point in card.points}
     drawn = runs.suites if len(runs.suites) <= DRAWN else []
     kept = read_traces(runs) if drawn else NO_TRACES
     return Report(
@@ -123,7 +125,7 @@ def make_report(runs: Runs) -> Report:
         refused_meshes=refused_meshes_table(runs),
         paper=paper_tables(evaluation),
         orderings=orderings({baseline: evaluate(runs.cells, baseline=baseline) for baseline in Baseline}),
-        pairs=pair_table(evaluation.tests),
+        pairs=pair_table([test for test in evaluation.tests if test.suite not in rungs]),
         outcomes={suite: outcome_figures(evaluation, suite) for suite in drawn},
         motion=motion_table(evaluation),
         motion_by_suite=[motion_figures(evaluation, suite, kept) for suite in drawn],
