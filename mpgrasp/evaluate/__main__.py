@@ -124,10 +124,10 @@ def _print(rows: Sequence[ImageScore], names: Sequence[str]) -> None:
     from mpgrasp.evaluate.scores import TOP, paired_tests, rates
 
     table = Table("detector")
-    for heading in ("best grasp right %", f"one of {TOP} right %"):
+    for heading in ("best grasp right %", f"one of {TOP} right %", "best at the border %"):
         table.add_column(heading, justify="right")
     for name in names:
-        table.add_row(name, *map(str, rates(rows, name)))
+        table.add_row(name, *map(str, rates(rows, name).values()))
     console = Console()
     console.print(table)
     for test in paired_tests(rows):
@@ -155,7 +155,7 @@ def _write(
         "rates": {
             name: {
                 key: {"count": rate.count, "n": rate.n, "interval": rate.interval}
-                for key, rate in zip(("top1", "top5"), rates(rows, name), strict=True)
+                for key, rate in rates(rows, name).items()
             }
             for name in names
         },

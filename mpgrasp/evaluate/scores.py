@@ -10,8 +10,11 @@ from mpgrasp.datasets.labelled_image import LabelledImage
 from mpgrasp.datasets.rectangle_metric import best_iou, right
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.evaluate.predict import grasps
+from mpgrasp.grasp import GraspRectangle
 from mpgrasp.statistics import holm, mcnemar, wilson_interval
 
+BORDER = 0.06
+"""Distance from the edge of an image within which a best grasp is suspicious, as a share of its side."""
 TOP = 5
 """Grasps of an image of which one must be right, beside the best one alone."""
 
@@ -29,6 +32,8 @@ class ImageScore:
     """One of the best five is."""
     iou: float
     """Greatest overlap of the best grasp with a label whose angle agrees."""
+    border: bool
+    """The best grasp lies within `BORDER` of the image's edge, where there is seldom an object."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,18 +78,24 @@ def score(detectors: Mapping[str, GraspDetector], image: LabelledImage) -> list[
                 top1=right(found[:1], image.rectangles),
                 top5=right(found, image.rectangles),
                 iou=best_iou(found[0], image.rectangles),
+                border=_at_border(found[0], image),
             )
         )
     return rows
 
 
-def rates(rows: Sequence[ImageScore], detector: str) -> tuple[Rate, Rate]:
-    """Return the rates of a detector: of its best grasp, and of its best five."""
+def _at_border(grasp: GraspRectangle, image: LabelledImage) -> bool:
+    size = image.depth.shape[0]
+    return min(grasp.u, grasp.v, size - 1 - grasp.u, size - 1 - grasp.v) < BORDER * size
+
+
+def rates(rows: Sequence[ImageScore], detector: str) -> dict[str, Rate]:
+    """Return the rates of a detector by the name of the column: top1, top5, and best grasps at the border."""
     mine = [row for row in rows if row.detector == detector]
-    return (
-        Rate(count=sum(row.top1 for row in mine), n=len(mine)),
-        Rate(count=sum(row.top5 for row in mine), n=len(mine)),
-    )
+    return {
+        key: Rate(count=sum(getattr(row, key) for row in mine), n=len(mine))
+        for key in ("top1", "top5", "border")
+    }
 
 
 def paired_tests(rows: Sequence[ImageScore]) -> list[PairedTest]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from mpgrasp.datasets.cornell import Cornell
 from mpgrasp.detectors import make_detector
 from mpgrasp.evaluate.__main__ import main
 from mpgrasp.evaluate.predict import grasps, square
-from mpgrasp.evaluate.scores import ImageScore, Rate, paired_tests, rates
+from mpgrasp.evaluate.scores import ImageScore, Rate, paired_tests, rates, score
 
 
 @pytest.mark.parametrize("kind", ["cornell", "jacquard"])
@@ -69,13 +70,28 @@ def test_a_grasp_is_told_in_pixels_of_the_image(tmp_path: Path) -> None:
     assert best.width_px > 40
 
 
+def test_a_best_grasp_on_a_false_match_in_a_corner_is_counted_as_at_the_border(tmp_path: Path) -> None:
+    image = square(Cornell(write_cornell(tmp_path / "c")).read("0101"), 300.0)
+    depth = image.depth.copy()
+    depth[2:12, 2:30] = 0.5
+    depth[120:180, 120:180] = np.median(depth)
+    (seen,) = score({"heuristic": make_detector("heuristic")}, replace(image, depth=depth))
+    assert seen.border
+    assert not seen.top1
+    (clean,) = score({"heuristic": make_detector("heuristic")}, image)
+    assert not clean.border
+
+
 def row(detector: str, image: int, top1: bool, top5: bool = True) -> ImageScore:
-    return ImageScore(image=str(image), object="o", detector=detector, top1=top1, top5=top5, iou=0.5)
+    return ImageScore(
+        image=str(image), object="o", detector=detector, top1=top1, top5=top5, iou=0.5, border=image < 2
+    )
 
 
 def test_rates_and_tests_are_those_of_the_rows() -> None:
     rows = [row("a", k, k < 9) for k in range(10)] + [row("b", k, k < 1) for k in range(10)]
-    assert rates(rows, "a") == (Rate(count=9, n=10), Rate(count=10, n=10))
+    expected = {"top1": Rate(count=9, n=10), "top5": Rate(count=10, n=10), "border": Rate(count=2, n=10)}
+    assert rates(rows, "a") == expected
     (test,) = paired_tests(rows)
     assert (test.a_alone, test.b_alone) == (8, 0)
     assert test.p_holm == pytest.approx(2 * 0.5**8)
