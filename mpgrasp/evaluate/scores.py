@@ -86,7 +86,7 @@ def score(detectors: Mapping[str, GraspDetector], image: LabelledImage) -> list[
 
 def _at_border(grasp: GraspRectangle, image: LabelledImage) -> bool:
     size = image.depth.shape[0]
-    return min(grasp.u, grasp.v, size - 1 - grasp.u, size - 1 - grasp.v) < BORDER * size
+    return bool(min(grasp.u, grasp.v, size - 1 - grasp.u, size - 1 - grasp.v) < BORDER * size)
 
 
 def rates(rows: Sequence[ImageScore], detector: str) -> dict[str, Rate]:
