@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -24,32 +25,44 @@ class Difference(NamedTuple):
     """Two-sided: how rare so large a difference is among resampled worlds, if there is none."""
 
 
-def difference(
-    scale: Scale, first: Results, second: Results, rate: float, *, resamples: int = 1000, seed: int = 0
-) -> Difference:
-    """Compare the levels at which two methods fall through a success rate.
+def differences(
+    scale: Scale, results: Sequence[Results], rate: float, *, resamples: int = 1000, seed: int = 0
+) -> dict[tuple[int, int], Difference]:
+    """Compare the levels at which methods fall through a success rate, every two of them.
 
-    Worlds are resampled, the same for both methods and at all levels; thresholds beyond the ladder count as
+    Worlds are resampled, the same for all methods and at all levels; thresholds beyond the ladder count as
     at its ends, which makes a difference smaller and never larger.
 
     Args:
         scale: of the levels.
-        first: results of a method.
-        second: results of the other one.
+        results: of each method.
         rate: success rate.
         resamples: number of times that worlds are drawn.
         seed: of the drawing.
+
+    Returns:
+        The difference by the places of the first and of the second method, the first one being less.
     """
-    worlds = sorted({world for of in (first, second) for results in of.values() for world in results})
+    worlds = sorted({world for of in results for rung in of.values() for world in rung})
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(len(worlds), np.full(len(worlds), 1 / len(worlds)), size=resamples)
     weights = np.vstack([np.ones(len(worlds)), drawn.astype(float)])
     ends = scale.rungs[0], scale.rungs[-1]
-    found = [np.clip(_eases(scale, of, worlds, weights, rate), *ends) for of in (first, second)]
-    gaps = found[0] - found[1]
-    spread = float(np.std(gaps[1:], ddof=1))
-    gap = float(gaps[0])
-    return Difference(*_told(scale, gap, gap - 1.96 * spread, gap + 1.96 * spread), p=_two_sided(gap, spread))
+    eases = [np.clip(_eases(scale, of, worlds, weights, rate), *ends) for of in results]
+    found = {}
+    for first, second in combinations(range(len(results)), 2):
+        gaps = eases[first] - eases[second]
+        gap, spread = float(gaps[0]), float(np.std(gaps[1:], ddof=1))
+        told = _told(scale, gap, gap - 1.96 * spread, gap + 1.96 * spread)
+        found[first, second] = Difference(*told, p=_two_sided(gap, spread))
+    return found
+
+
+def difference(
+    scale: Scale, first: Results, second: Results, rate: float, *, resamples: int = 1000, seed: int = 0
+) -> Difference:
+    """Compare two methods, as `differences` does several."""
+    return differences(scale, (first, second), rate, resamples=resamples, seed=seed)[0, 1]
 
 
 def _two_sided(gap: float, spread: float) -> float:

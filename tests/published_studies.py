@@ -6,6 +6,7 @@ import csv
 import json
 import re
 from functools import cache
+from statistics import median
 from typing import Any
 
 from published_runs import NAMES, RESULTS, Share, entry, share
@@ -302,6 +303,13 @@ def significant(ladder: str, *detectors: str) -> int:
         for (first, second, _), row in _comparisons(ladder).items()
         if not detectors or {first, second} <= set(detectors)
     )
+
+
+def opening(ladder: str, detector: str) -> float:
+    """Return the median opening of a detector's grasps on a ladder [mm]."""
+    lines = (RESULTS / "ladders" / ladder / "episodes.jsonl").read_text(encoding="utf-8").splitlines()
+    rows = [row for row in map(json.loads, lines) if row["detector"] == detector and row["grasp"]]
+    return float(1000 * median(row["grasp"]["width"] for row in rows))
 
 
 def coverage(rate: float) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from toy_ladders import LEVELS, LINE, STICKS, curve
 
-from mpgrasp.threshold_difference import Difference, difference
+from mpgrasp.threshold_difference import Difference, difference, differences
 from mpgrasp.thresholds import Results
 
 
@@ -19,6 +19,15 @@ def worlds(rate: Callable[[float], float], n: int, rng: np.random.Generator) -> 
 def test_equal_results_do_not_differ() -> None:
     results = worlds(curve(1.3, 0.8), 20, np.random.default_rng(6))
     assert difference(STICKS, results, results, 0.5) == Difference(1.0, 1.0, 1.0, 1.0)
+
+
+def test_several_methods_are_compared_as_two_would_be() -> None:
+    rng = np.random.default_rng(9)
+    a, b, c = (worlds(curve(middle, 0.6), 30, rng) for middle in (1.2, 1.5, 2.4))
+    found = differences(STICKS, (a, b, c), 0.5, resamples=50)
+    assert found.keys() == {(0, 1), (0, 2), (1, 2)}
+    assert found[0, 1] == difference(STICKS, a, b, 0.5, resamples=50)
+    assert found[1, 2] == difference(STICKS, b, c, 0.5, resamples=50)
 
 
 def test_methods_that_differ_are_told_apart_and_the_quotient_is_that_of_their_levels() -> None:

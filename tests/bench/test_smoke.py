@@ -67,3 +67,13 @@ def test_workers_that_share_their_networks_play_what_workers_with_their_own_do(t
         assert main(["thin", *options, "--runtime", runtime, "--quiet", "--out", str(out)]) == 0
     assert records_without_timing(tmp_path / "auto") == records_without_timing(tmp_path / "shared")
     assert main(["replay", str(tmp_path / "shared"), "--episode", "0"]) == 0
+
+
+def test_a_ladder_of_real_episodes_ends_with_levels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["ladder", "thickness", "--detector", "heuristic", "--controller", "straight_down"]
+    assert main([*words, "--episodes", "3", "--workers", "2", "--quiet", "--out", str(tmp_path / "run")]) == 0
+    assert "to 50 %" in capsys.readouterr().out
+    assert len(records(tmp_path / "run")) == 3
+    assert (tmp_path / "run" / "report.html").is_file()

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 from mpgrasp.bench.record import Cell, Cells, Method, Record, played
 from mpgrasp.statistics import holm
-from mpgrasp.threshold_difference import Difference, difference
+from mpgrasp.threshold_difference import Difference, differences
 from mpgrasp.thresholds import Fit, Results, Scale, Threshold
 
 RATES = (0.9, 0.5)
@@ -100,15 +99,12 @@ def comparisons(scale: Scale, methods: list[Climb]) -> list[Comparison]:
     """Return every pair of methods at each of `RATES`."""
     rows = []
     for rate in RATES:
+        found = differences(scale, [climb.results for climb in methods], rate)
         of_rate = [
             Comparison(
-                first=a.method,
-                second=b.method,
-                rate=rate,
-                found=difference(scale, a.results, b.results, rate),
-                p_holm=1.0,
+                first=methods[a].method, second=methods[b].method, rate=rate, found=between, p_holm=1.0
             )
-            for a, b in combinations(methods, 2)
+            for (a, b), between in found.items()
         ]
         corrected = holm([row.found.p for row in of_rate])
         rows += [replace(row, p_holm=p) for row, p in zip(of_rate, corrected, strict=True)]
