@@ -21,7 +21,7 @@ from mesh_writers import box, stl
 HERE = Path(__file__).resolve().parent
 RUN = HERE / "results" / "sticks-of-2mm" / "dhrnet"
 """A published run, whose first episodes become the run that commands are given."""
-PACKAGES = ("bench", "scene", "detectors", "training")
+PACKAGES = ("bench", "evaluate", "scene", "detectors", "training")
 """Programs that are `python -m mpgrasp.PROGRAM`; the others are scripts beside this file."""
 
 
@@ -94,7 +94,25 @@ _LINES: tuple[tuple[str, str], ...] = (
     # what plays
     ("bench", f"{_REQUIRED}SUITE"),
     ("bench ''", "unknown suite; got ''"),
-    ("bench thick", "unknown suite; got 'thick'; allowed: single, stacked"),
+    ("bench thick", "unknown suite; got 'thick'; allowed: pile, single, stacked"),
+    ("bench plan", f"{_REQUIRED}SUITE"),
+    ("bench plan thin --out x", "plan with --out"),
+    ("bench profile thin --runtime magic", "unknown runtime; got 'magic'"),
+    ("bench ladder thick", "unknown ladder; got 'thick'; allowed: calibration"),
+    ("bench ladder absent.toml", "unreadable ladder; got 'absent.toml'"),
+    ("bench ladder suites/bytes.toml", "ladder is not valid TOML"),
+    ("bench ladder thickness --shard 1/2", "a ladder with --shard"),
+    ("bench ladders thick", "unknown ladder; got 'thick'"),
+    ("bench race oracle/mppc --suite thin", "a race is of two methods"),
+    ("bench race oracle/mppc oracle/mvp", f"{_REQUIRED}--suite"),
+    ("bench race oracle/mppc oracle/mppc --suite thin", "a race of a method with itself"),
+    ("bench race oracle/mppc oracle/mvp --suite thin --alpha 2", "unusable number; got '2'"),
+    ("bench thin --runtime shared --engine ray", "--runtime shared with --engine ray"),
+    ("evaluate", f"{_REQUIRED}dataset"),
+    ("evaluate imagenet .", "invalid choice: 'imagenet'"),
+    ("evaluate cornell absent", "no such folder; got 'absent'"),
+    ("evaluate cornell folder", "no Cornell dataset; got 'folder'"),
+    ("evaluate jacquard folder --limit 0", "unusable number; got '0'"),
     ("bench absent.toml", "unreadable suite; got 'absent.toml'"),
     ("bench suites/bytes.toml", "suite is not valid TOML"),
     ("bench suites/long.toml", "2 MB, more than 1 MB"),

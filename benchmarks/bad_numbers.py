@@ -42,7 +42,9 @@ BAD_NUMBERS: tuple[tuple[str, str, tuple[str, ...], str], ...] = (
     ("run_time", "--rounds", ("0", _HUGE), "1 to 100000"),
     ("same_bits", "--episodes", ("0",), "1 to 100000"),
     ("singular_film", "--episode", ("-1",), "0 to 99999"),
-    ("stages", "--ticks", ("0", "few"), "1 to 100000"),
+    ("bench profile thin", "--episodes", ("0", "few"), "1 to 1000"),
+    ("ladder_coverage", "--methods", ("0", "few"), "1 to 100000"),
+    ("scaling", "--rounds", ("0", "few"), "1 to 100000"),
     ("thickness", "--scenes", _COUNT, "1 to 100000"),
     ("thickness", "--seed", ("-1",), "0 or more"),
 )

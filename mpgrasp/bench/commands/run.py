@@ -27,6 +27,10 @@ examples:
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench thin --episodes 1000 --shard 3/16 --out shards/3
   python -m mpgrasp.bench merge shards/* --out thin-1000     (see merge --help)
+  python -m mpgrasp.bench ladder thickness --detector dhrnet,ggcnn     (see ladder and ladders --help)
+  python -m mpgrasp.bench race dhrnet/mppc ggcnn/mppc --suite thin     (see race --help)
+  python -m mpgrasp.bench plan thin --episodes 1000  (see plan --help)
+  python -m mpgrasp.bench profile thin               (see profile --help)
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
@@ -166,7 +170,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--runtime",
         metavar="|".join(RUNTIMES),
         default="auto",
-        help="what computes the networks (default: auto, the fastest one here)",
+        help="what computes the networks (default: auto, the fastest one here; shared: one process for all "
+        "workers, which serves them best from one GPU)",
     )
     add(
         "--camera",

@@ -115,7 +115,7 @@ def test_a_declaration_is_all_that_there_is_to_know_of_a_network(name: str) -> N
 
 
 def test_every_network_is_a_detector() -> None:
-    assert tuple(DETECTORS) == (*NETWORKS, "oracle")
+    assert tuple(DETECTORS) == (*NETWORKS, "heuristic", "oracle")
 
 
 def test_an_unknown_network_is_refused_with_the_names() -> None:
