@@ -122,11 +122,22 @@ class WristCamera:
         return self._frame(data, T_world_camera, depth)
 
     def render_both(
-        self, data: mujoco.MjData, T_world_camera: FloatArray, rng: np.random.Generator
+        self,
+        data: mujoco.MjData,
+        T_world_camera: FloatArray,
+        rng: np.random.Generator,
+        pattern: NDArray[np.float32] | None = None,
     ) -> tuple[DepthFrame, DepthFrame]:
-        """Depth that the sensor reports from `T_world_camera` (4, 4), and the perfect depth of that image."""
+        """Depth that the sensor reports from `T_world_camera` (4, 4), and the perfect depth of that image.
+
+        Args:
+            data: state of the model.
+            T_world_camera: pose of an OpenCV camera.
+            rng: source of the noise.
+            pattern: (H, W) disparity error that stays, of `image`'s size [px of the sensor].
+        """
         true = self._depth(data, T_world_camera)
-        reported = self._frame(data, T_world_camera, self._measured(true, rng))
+        reported = self._frame(data, T_world_camera, self._measured(true, rng, pattern))
         return reported, replace(reported, depth=self._window(true))
 
     def rgb(self, data: mujoco.MjData, T_world_camera: FloatArray | None = None) -> NDArray[np.uint8]:

@@ -27,8 +27,18 @@ LONGEST = 0.2
 """Longest edge of a bounding box [m]."""
 DENSITY = (200.0, 1500.0)
 """Least and greatest density of objects [kg/m^3]."""
-LIGHTEST = 0.001
+LIGHTEST = 0.0003
 """Least mass of an object [kg]."""
+FLAT_CLOTH = 0.1
+"""Share of the scenes on a flat cloth."""
+UNEVEN_CLOTH = 0.4
+"""Share of the scenes on a cloth more uneven than `USUAL_CLOTH` ..."""
+USUAL_CLOTH, WORST_CLOTH = 0.0015, 0.006
+"""... up to the second one (RMS) [m]."""
+WRINKLED = 0.2
+"""Share of the scenes with wrinkles ..."""
+WRINKLES = (0.0005, 0.004)
+"""... and the range of their height [m]."""
 LIKENESS = 0.15
 """A box whose three edges all lie within this share of an evaluation object's is drawn again."""
 THIN_SCENES = 0.5
@@ -43,13 +53,19 @@ STACK_HEIGHT = 4
 """Most objects in a stack."""
 
 
+LADDER_STICKS = [(0.060, 0.018, float(h)) for h in np.geomspace(0.0005, 0.0056, 11)]
+"""Sticks of the ladders `thickness`, `cloth` and `noise`, with no gap for another between them [m]."""
+LADDER_BLOCKS = [(0.090, float(w), 0.090) for w in np.geomspace(0.020, 0.076, 7)]
+"""Blocks of the ladder `size`, likewise [m]."""
+
+
 def random_object(rng: np.random.Generator, name: str, thin: bool) -> ObjectModel:
     """Draw an object: a box, stick, plate, disc, ring, letter, stack, hull ...
 
     Args:
         rng: source of all that is random.
         name: name of the object.
-        thin: lie 2 to 12 mm high.
+        thin: lie 0.8 to 12 mm high.
     """
     while True:
         parts = _pick(rng, thin)(rng)
@@ -94,9 +110,17 @@ def training_scene_config(rng: np.random.Generator) -> SceneConfig:
         pose="upright" if upright or rng.random() < 0.5 else "random",
         centre=(WORKSPACE_CENTRE[0] + offset[0] * 0.8, WORKSPACE_CENTRE[1] + offset[1]),
         half_extent=float(half_extent),
-        cloth_unevenness=0.0 if rng.random() < 0.1 else rng.uniform(0.0, 0.0015),
+        cloth_unevenness=_unevenness(rng),
         cloth_wavelength=rng.uniform(0.04, 0.15),
+        cloth_wrinkles=float(rng.uniform(*WRINKLES)) if rng.random() < WRINKLED else 0.0,
     )
+
+
+def _unevenness(rng: np.random.Generator) -> float:
+    kind, usual, worse = rng.random(), rng.uniform(0, USUAL_CLOTH), rng.uniform(USUAL_CLOTH, WORST_CLOTH)
+    if kind < FLAT_CLOTH:
+        return 0.0
+    return float(worse if kind < FLAT_CLOTH + UNEVEN_CLOTH else usual)
 
 
 def resembles_evaluation_object(size: ArrayLike) -> bool:
@@ -107,14 +131,15 @@ def resembles_evaluation_object(size: ArrayLike) -> bool:
 
 @cache
 def _evaluation_sizes() -> FloatArray:
-    """Return sorted edges (n, 3) of the boxes around the catalogue's and all shipped suites' objects [m].
+    """Return sorted edges (n, 3) of the boxes around the objects of catalogue, suites and ladders [m].
 
     What a seed means depends on them: where they change, `shards.FORMAT` has to be counted up.
     """
     catalogue: list[str | ObjectModel] = [name for names in OBJECT_SETS.values() for name in names]
     declared = [o for name in suite_names() for scene in load_suite(name).scenes for o in scene.objects]
     models = [load_object(o) if isinstance(o, str) else o for o in catalogue + declared]
-    return np.unique([np.sort(model.size) for model in models], axis=0)
+    sizes = [*(model.size for model in models), *LADDER_STICKS, *LADDER_BLOCKS]
+    return np.unique(np.sort(sizes, axis=1), axis=0)
 
 
 def _pick(rng: np.random.Generator, thin: bool) -> Family:

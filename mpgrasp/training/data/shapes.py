@@ -12,7 +12,7 @@ from mpgrasp.scene.objects.model import Part
 
 GRASPABLE = 0.072
 """Widest thing that the gripper closes on with a little room [m]."""
-THIN_HEIGHT = (0.002, 0.012)
+THIN_HEIGHT = (0.0008, 0.012)
 """Heights of thin objects [m]."""
 STANDING = (1.0, 0.0, 0.0, 0.0)
 """Leaves a part's z axis upright."""
@@ -34,9 +34,8 @@ def box(size: ArrayLike, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
 
 
 def thickness(rng: np.random.Generator) -> float:
-    """Height of a thin object [m]; half of them within the lower 3 mm to 7 mm, where the trouble is."""
-    low, high = THIN_HEIGHT
-    return float(low + (high - low) * rng.beta(1.3, 1.9))
+    """Height of a thin object [m], half of them up to 4 mm, where the trouble is: even in its logarithm."""
+    return float(np.exp(rng.uniform(*np.log(THIN_HEIGHT))))
 
 
 def ring(radius: float, width: float, height: float, n: int = 12) -> list[Part]:

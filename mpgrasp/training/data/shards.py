@@ -19,7 +19,7 @@ from mpgrasp.training.data.labels import ANGLE_UNIT, DEPTH_UNIT, QUALITY_UNIT
 from mpgrasp.training.data.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMNS
 from mpgrasp.training.data.views import META_COLUMNS
 
-FORMAT = 3
+FORMAT = 4
 """Format of shards and `meta.json`, and of a seed's scenes: each is a function of seed, index and format.
 
 When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do

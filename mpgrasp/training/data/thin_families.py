@@ -1,4 +1,4 @@
-"""Families of thin objects: 2 to 12 mm high as they lie."""
+"""Families of thin objects: 0.8 to 12 mm high as they lie."""
 
 from __future__ import annotations
 

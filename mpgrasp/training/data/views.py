@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mpgrasp.camera.config import D435_INTRINSICS
+from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.depth import CROP, NETWORK_SIZE, CameraIntrinsics, crop_resize
 from mpgrasp.detectors.antipodal.analysis import antipodal_grasps
@@ -18,8 +19,9 @@ from mpgrasp.height_map import HeightMap
 from mpgrasp.scene.scene import Scene, build_scene
 from mpgrasp.training.data.appearance import randomise_appearance
 from mpgrasp.training.data.generate_config import GenerateConfig
-from mpgrasp.training.data.labels import QUALITY_UNIT, encode_depth, view_labels
+from mpgrasp.training.data.labels import LABEL_HAND, QUALITY_UNIT, encode_depth, view_labels, without
 from mpgrasp.training.data.random_objects import training_scene_config
+from mpgrasp.training.data.sensors import BASELINE, bad_border, random_sensor, waves
 from mpgrasp.training.data.verification import verify
 from mpgrasp.workspace import WORKSPACE_CENTRE
 
@@ -38,8 +40,9 @@ ELSEWHERE = 0.12
 """Share of the views that look at a random spot of the workspace instead of at an object."""
 LOOK_ASIDE = 0.7
 """An object aimed at lies up to this share of half the field of view off the image's centre."""
-TILT = np.deg2rad(1.5)
-"""Standard deviation of the camera's tilt about each axis [rad], cut at twice that."""
+TILT = np.deg2rad(2.5)
+"""Standard deviation of the camera's tilt about each axis [rad], cut at twice that: a wrist is never quite
+upright, and its calibration is off."""
 THIN = 0.013
 """Scenes that rise no higher over the cloth count as thin [m]."""
 
@@ -66,26 +69,32 @@ def make_views(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     truth = scene.height_map()
     verified = verify(
         scene,
-        antipodal_grasps(truth),
+        antipodal_grasps(truth, LABEL_HAND),
         np.random.default_rng([config.seed, index, _LIFTS]),
         index=index,
     )
     above = truth.height - truth.support
     thickness = float(above[truth.label > 0].max(initial=0.0))
     data = scene.data()
-    camera = WristCamera(scene.model, config.camera, crop=CROP, colour=config.colour)
+    widest = DepthNoise(baseline=BASELINE[1])  # its shadows need the widest margin
+    camera = WristCamera(scene.model, config.camera, widest, crop=CROP, colour=config.colour)
+    shape = camera.image.height, camera.image.width
+    scale = camera.image.fx / widest.focal_px
     rows: dict[str, list[np.ndarray]] = {}
     try:
         for _ in range(config.views):
             T = camera_pose(truth, rng)
-            noisy, true = (crop_resize(frame) for frame in camera.render_both(data, T, rng))
-            labels = view_labels(verified.grasps, true)
+            camera.noise = random_sensor(rng)
+            pattern = waves(camera.noise, shape, scale, rng)
+            noisy, true = (crop_resize(frame) for frame in camera.render_both(data, T, rng, pattern))
+            depth, spoilt = bad_border(noisy.depth, rng)
+            labels = without(view_labels(verified.grasps, true), spoilt)
             meta = (
                 T[2, 3], index, thickness, len(scene.objects), thickness < THIN,
                 scene.config.cloth_unevenness, labels.quality.max() * QUALITY_UNIT,
                 *T[:2, 3], *cv2.Rodrigues(T[:3, :3])[0][:, 0],
             )  # fmt: skip
-            row = dict(vars(labels), depth=encode_depth(noisy.depth), meta=np.array(meta, np.float32))
+            row = dict(vars(labels), depth=encode_depth(depth), meta=np.array(meta, np.float32))
             if noisy.rgb is not None:
                 row["rgb"] = noisy.rgb
             for name, value in row.items():
