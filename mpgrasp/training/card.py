@@ -31,6 +31,8 @@ class TrainingRecord:
     """Steps of the optimiser."""
     elapsed: float
     """Wall-clock time [s]."""
+    start: Mapping[str, Any] | None = None
+    """Weights that it went on from: file, SHA-256 and their card; None: random ones."""
     device: str
     """cpu or cuda."""
     parameters: int
@@ -43,6 +45,7 @@ class TrainingRecord:
         config = self.config
         return {
             "command": self.command,
+            **({"start": self.start} if self.start else {}),
             "data": self.data,
             "validation_data": self.validation_data,
             "training_images": self.training_images,

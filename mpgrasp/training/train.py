@@ -47,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=tuple(CHANNELS),
         help="depth, colour or both (default: %(default)s)",
     )
+    add(
+        "--from", dest="start", type=Path, metavar="FILE", help="weights to go on from (default: random ones)"
+    )
     add("--settings", default="{}", metavar="JSON", help="of the network, such as '{\"width\": 48}'")
     add(
         "--epochs",
@@ -157,7 +160,9 @@ def main(args: argparse.Namespace) -> int:
         args.data, holdout=0 if separate else config.holdout, colour=colour, images=config.images
     )
     curves = args.curves / f"{out.stem}.csv" if args.curves else None
-    trainer = Trainer(config, dataset, out, separate, curves=curves, command=command_line(args))
+    trainer = Trainer(
+        config, dataset, out, separate, curves=curves, command=command_line(args), start=args.start
+    )
     with ProgressLog() as log:
         resumed = args.resume and trainer.resume()
         log.note(
@@ -203,7 +208,8 @@ def command_line(args: argparse.Namespace) -> str:
         if name in NOT_OPTIONS or value == args.default_of(name):
             continue
         values = value if isinstance(value, list) else [] if value is True else [value]
-        words += [f"--{name.replace('_', '-')}", *map(str, values)]
+        option = "from" if name == "start" else name.replace("_", "-")
+        words += [f"--{option}", *map(str, values)]
     return shlex.join(words)
 
 

@@ -32,6 +32,7 @@ from mpgrasp.training.losses import PARTS, grasp_loss
 from mpgrasp.training.metrics import format_summary
 from mpgrasp.training.optimiser import make_optimiser, rate_at, update_average
 from mpgrasp.training.progress import ProgressLog
+from mpgrasp.training.start import start_from
 from mpgrasp.training.trainer_config import TrainConfig
 from mpgrasp.training.validation import SELECT_BY, Validator
 
@@ -57,9 +58,11 @@ class Trainer:
         validation: images to validate on.
         curves: CSV file of the curves, with a PNG beside it; by default they lie beside `out`.
         command: command that started the run, for the training card.
+        start: weights file to go on from; random weights by default.
 
     Raises:
         ConfigError: a network that cannot be built, or data that cannot be validated on.
+        WeightsError: weights to go on from that do not fit.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class Trainer:
         *,
         curves: Path | None = None,
         command: str = "",
+        start: Path | None = None,
     ) -> None:
         self.config, self.dataset, self.out = config, dataset, out
         self.validation = validation or dataset
@@ -88,6 +92,7 @@ class Trainer:
             # a width output of 1 is the same share of every image
             width_px=width_unit(config.input.size),
         )
+        self.start = None if start is None else start_from(start, self.weights)
         network.to(device=self.device)
         self.network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.validator = Validator(
@@ -137,7 +142,7 @@ class Trainer:
             ConfigError: the loss, a weight or an output of the network is no longer finite.
             OutputError: weights, curves or checkpoint cannot be written.
         """
-        last_step = self.step + stop_after if stop_after is not None else None
+        last_step = None if stop_after is None else self.step + stop_after
         start, saved = time.monotonic() - self.elapsed, time.monotonic()
         batches = self.batches.ahead(self.step)
         pending: list[Tensor] = []
@@ -255,6 +260,7 @@ class Trainer:
             training_scenes=self.dataset.scene_count,
             steps=self.step,
             elapsed=self.elapsed,
+            start=self.start,
             device=self.device.type,
             parameters=self.parameters,
             best=self.best,
@@ -268,13 +274,9 @@ class Trainer:
             OutputError: the file cannot be written.
         """
         self._require_finite_weights()
-        state = {
-            "network": self.network.state_dict(),
-            "average": self.average,
-            "optimiser": self.optimiser.state_dict(),
-            "losses": self._losses,
-            **{name: getattr(self, name) for name in RESUMED},
-        }
+        state = {"network": self.network.state_dict(), "optimiser": self.optimiser.state_dict()}
+        state |= {"average": self.average, "losses": self._losses}
+        state |= {name: getattr(self, name) for name in RESUMED}
         write_checkpoint(self.checkpoint, self.config, state)
 
     def resume(self) -> bool:

@@ -97,7 +97,17 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 def test_the_command_on_the_card_makes_the_same_run(tmp_path: Path) -> None:
     argv = ["dhrnet", "--data", "a b", "c", "--settings", '{"width": 8}', "--lr", "0.001", "--input", "rgbd"]
-    argv += ["--no-augmentation", "--images", "50", "--minutes", "3", "--lift-images", "0"]
+    argv += [
+        "--no-augmentation",
+        "--images",
+        "50",
+        "--minutes",
+        "3",
+        "--lift-images",
+        "0",
+        "--from",
+        "w.safetensors",
+    ]
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     args = parser.parse_args(argv)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from toy_training import trainer
+from toy_training import SMALL, config, trainer
 
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.weights import load_weights
-from mpgrasp.exceptions import ConfigError
+from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.training.metrics import match_labels
 from mpgrasp.training.progress import ProgressLog
+from mpgrasp.training.trainer import Trainer
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +47,32 @@ def test_training_learns_the_toy_set_and_its_weights_work(shards: Path, tmp_path
         truth = run.dataset.sample(int(i))
         hits.append(match_labels(*detector.grasp_arrays(truth.depth), truth).hit)
     assert np.mean(hits) == pytest.approx(best["hit"], abs=0.2)  # float32 here, bfloat16 there
+
+
+def test_a_training_goes_on_from_a_file_and_its_card_says_from_which(shards: Path, tmp_path: Path) -> None:
+    first = trainer(shards, tmp_path / "first.safetensors", average=0.0)
+    first.run(ProgressLog(quiet=True))
+    first.save()
+    start = tmp_path / "first.safetensors"
+    dataset = first.dataset
+    second = Trainer(config(seed=5), dataset, tmp_path / "second.safetensors", start=start)
+    begun = second.network.state_dict()
+    assert all(torch.equal(begun[key], value) for key, value in first.average.items())
+    assert all(torch.equal(second.average[key], value) for key, value in first.average.items())
+    second.run(ProgressLog(quiet=True), stop_after=1)
+    second.save()
+    told = read_card(tmp_path / "second.safetensors")["card"]["start"]
+    assert told["file"] == "first.safetensors"
+    assert told["sha256"] == hashlib.sha256(start.read_bytes()).hexdigest()
+    assert told["card"]["steps"] == first.step
+
+
+def test_weights_that_do_not_fit_are_not_gone_on_from(shards: Path, tmp_path: Path) -> None:
+    first = trainer(shards, tmp_path / "first.safetensors")
+    first.save()
+    other = config(settings={**SMALL, "width": 16})
+    with pytest.raises(WeightsError, match="other settings"):
+        Trainer(other, first.dataset, tmp_path / "w.safetensors", start=tmp_path / "first.safetensors")
 
 
 def test_a_resumed_run_is_the_same_as_an_unbroken_one(shards: Path, tmp_path: Path) -> None:

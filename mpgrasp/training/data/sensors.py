@@ -48,7 +48,7 @@ PIECE_LOST, PIECE_WRONG = 0.35, 0.45
 
 
 def random_sensor(rng: np.random.Generator) -> DepthNoise:
-    """Draw a sensor; the generator advances alike whatever it is."""
+    """Draw a sensor."""
     waves, wave, white = rng.random() < WAVES, rng.uniform(*np.log(WAVE)), rng.random() < WHITE
     return DepthNoise(
         baseline=float(rng.uniform(*BASELINE)),

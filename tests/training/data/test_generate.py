@@ -28,6 +28,7 @@ from mpgrasp.training.data.verification import GOOD, TRIAL_COLUMNS, Verified
 from mpgrasp.training.data.views import (
     CAMERA_HEIGHT,
     META_COLUMNS,
+    TILT,
     camera_pose,
     make_scene,
     make_views,
@@ -263,7 +264,9 @@ def test_cameras_are_between_z_min_and_z_max_and_look_down() -> None:
     rng = np.random.default_rng(0)
     poses = np.array([camera_pose(truth, rng) for _ in range(300)])
     assert np.all((poses[:, 2, 3] >= CAMERA_HEIGHT[0]) & (poses[:, 2, 3] <= CAMERA_HEIGHT[1]))
-    assert np.all(np.arccos(-poses[:, 2, 2]) < np.deg2rad(4.5))
+    tilt = np.arccos(-poses[:, 2, 2])
+    assert np.all(tilt < np.sqrt(2) * 2 * TILT + 1e-3)
+    assert np.mean(tilt) > TILT  # of both axes together
     assert np.allclose(poses[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1), np.eye(3))
     # most views hold the object, some do not
     half_view = poses[:, 2, 3] * 175 / 385

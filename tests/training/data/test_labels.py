@@ -13,11 +13,14 @@ from mpgrasp.grasp import image_to_world_angle
 from mpgrasp.training.data.labels import (
     ANGLE_UNIT,
     DEPTH_UNIT,
+    LABEL_HAND,
+    ViewLabels,
     decode_angle,
     decode_depth,
     encode_angle,
     encode_depth,
     view_labels,
+    without,
 )
 
 STICK = Solid(x=0.51, y=0.02, yaw=-0.5, length=0.09, breadth=0.024, height=0.02)
@@ -44,6 +47,43 @@ def test_labels_lead_back_to_the_object_s_centre_line(yaw: float) -> None:
     assert np.all((metres > 0.022) & (metres < 0.034))
     assert labels.object_mask[rows, cols].all()
     assert 0 < labels.object_mask.mean() < 0.5
+
+
+def test_grasps_where_the_depth_is_not_believed_are_left_out_and_no_others() -> None:
+    rng = np.random.default_rng(0)
+    maps = {k: rng.integers(1, 255, (20, 30)).astype(np.uint8) for k in ("quality", "angle", "width")}
+    labels = ViewLabels(**maps, object_mask=np.ones((20, 30), np.uint8))
+    spoilt = rng.random((20, 30)) < 0.3
+    left = without(labels, spoilt)
+    for name, nothing in (("quality", 0), ("angle", 128), ("width", 0)):
+        assert (getattr(left, name)[spoilt] == nothing).all()
+        assert (getattr(left, name)[~spoilt] == maps[name][~spoilt]).all()
+    assert left.object_mask.all()
+
+
+@pytest.mark.parametrize(("height", "least"), [(0.001, 0.3), (0.0015, 0.5), (0.002, 0.7), (0.006, 0.8)])
+def test_thin_sticks_have_labels_too(height: float, least: float) -> None:
+    stick = Solid(x=0.5, y=0.0, yaw=0.2, length=0.10, breadth=0.02, height=height)
+    assert antipodal_grasps(height_map(stick), LABEL_HAND).quality.max() > least
+
+
+def test_labels_open_with_room_alone_and_with_what_there_is_beside_a_neighbour() -> None:
+    def opening(gap: float) -> float:
+        stick = Solid(x=0.5, y=0.0, yaw=0.0, length=0.10, breadth=0.02, height=0.02)
+        other = Solid(x=0.5, y=0.02 + gap, yaw=0.0, length=0.10, breadth=0.02, height=0.02)
+        grasps = antipodal_grasps(height_map(stick, other), LABEL_HAND)
+        truth = grasps.height_map
+        x, y = (
+            start + truth.cell * np.arange(n)
+            for start, n in zip((truth.x0, truth.y0), truth.height.shape[::-1], strict=True)
+        )
+        near = np.hypot(x[None] - stick.x, y[:, None] - stick.y) < 0.012
+        at = np.where(near, grasps.quality, -1).argmax()
+        return float(grasps.width.ravel()[at]) + LABEL_HAND.opening_margin
+
+    wide = 0.02 + 2 * LABEL_HAND.margin[1]
+    assert opening(0.08) == pytest.approx(wide, abs=0.003)
+    assert opening(0.026) < wide - 0.006
 
 
 def test_angles_survive_packing_at_the_wrap_too() -> None:

@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from mpgrasp.bench.ladders.declaration import ladder_names, load_ladder
 from mpgrasp.scene.objects.catalogue import OBJECT_SETS, load_object
 from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.training.data.hollow_families import HOLLOW_FAMILIES
 from mpgrasp.training.data.random_objects import (
+    FLAT_CLOTH,
     LIKENESS,
+    UNEVEN_CLOTH,
+    USUAL_CLOTH,
+    WORST_CLOTH,
+    WRINKLED,
     _evaluation_sizes,
     random_object,
     resembles_evaluation_object,
@@ -50,12 +56,31 @@ def test_objects_that_a_suite_declares_itself_are_kept_out_like_the_catalogue(
     assert resembles_evaluation_object(np.roll(size, 1) * 0.9)
 
 
+@pytest.mark.parametrize("name", ladder_names())
+def test_what_a_ladder_declares_at_any_of_its_rungs_is_kept_out(name: str) -> None:
+    ladder = load_ladder(name)
+    for rung in ladder.scale.levels:
+        for declared in ladder.at(rung).scene.objects:
+            model = load_object(declared) if isinstance(declared, str) else declared
+            assert resembles_evaluation_object(model.size), (rung, model.name)
+
+
+def test_clothes_reach_from_flat_to_rougher_than_the_usual_one() -> None:
+    rng = np.random.default_rng(3)
+    scenes = [training_scene_config(rng) for _ in range(300)]
+    uneven = np.array([scene.cloth_unevenness for scene in scenes])
+    assert abs(np.mean(uneven == 0) - FLAT_CLOTH) < 0.06
+    assert abs(np.mean(uneven > USUAL_CLOTH) - UNEVEN_CLOTH) < 0.1
+    assert 0.005 < uneven.max() <= WORST_CLOTH
+    assert abs(np.mean([scene.cloth_wrinkles > 0 for scene in scenes]) - WRINKLED) < 0.08
+
+
 def test_what_a_seed_means_is_counted_by_the_format() -> None:
     # When this fails because objects were added to the catalogue or a suite, a seed means other scenes than
     # those that data on disk shows: count shards.FORMAT up, and renew both values here.
     micrometres = np.unique(np.rint(1e6 * _evaluation_sizes()).astype("<i8"), axis=0)
     digest = hashlib.sha256(micrometres.tobytes()).hexdigest()
-    assert (FORMAT, digest) == (3, "897233cff239f683ee1c5bb4cddfb42016d3c618b14d6538a9c51c42d02d55c6")
+    assert (FORMAT, digest) == (4, "64c4e5bf71b52d3126ad07db053ff0ec65350d08d970b335054e7cfe3cf4643c")
 
 
 def test_thin_objects_are_thin_and_all_objects_are_sane() -> None:
@@ -64,10 +89,10 @@ def test_thin_objects_are_thin_and_all_objects_are_sane() -> None:
         thin = k % 2 == 0
         model = random_object(rng, "o", thin)
         assert max(model.size) <= 0.2
-        assert 0.0005 < model.mass < 1.5
+        assert 0.0002 < model.mass < 1.5
         assert 199 < model.mass / model.volume < 1501
         if thin:
-            assert 0.0019 < model.size[2] < 0.0121
+            assert 0.0007 < model.size[2] < 0.0121
 
 
 def test_most_objects_have_a_width_that_the_gripper_can_close_on() -> None:
@@ -91,7 +116,6 @@ def test_about_half_of_the_scenes_hold_thin_objects_alone() -> None:
     counts = [len(c.objects) for c in configs]
     assert min(counts) == 1
     assert 8 <= max(counts) <= 10
-    assert all(0 <= c.cloth_unevenness <= 0.0015 for c in configs)
     assert max(abs(c.centre[1]) for c in configs) <= 0.2
 
 
@@ -110,7 +134,7 @@ def test_every_family_gives_sane_objects(family: Family) -> None:
     sizes = []
     for _ in range(20):
         model = ObjectModel(name="o", parts=tuple(family(rng)), mass=0.1)
-        assert 1e-7 < model.volume < 1.5e-3
+        assert 1e-8 < model.volume < 1.5e-3
         sizes.append(model.size)
     assert np.ptp(sizes, axis=0).max() > 0.005  # dimensions vary
     if family in THIN_FAMILIES:
