@@ -135,7 +135,7 @@ BAD_WEIGHTS: dict[str, BadWeights] = {
     "pt-list": _pickle("not a state dict.*got 'list'", lambda: [torch.zeros(3)]),
     "pt-nested": _pickle("not a state dict", lambda: {"state_dict": {"conv1.weight": torch.zeros(3)}}),
     "pt-numbered": _pickle("not a state dict", lambda: {1: torch.zeros(3)}),
-    "pt-whole-network": _pickle("not a PyTorch file", lambda: build_network(PUBLISHED, {})),
+    "pt-whole-network": _pickle("a pickled module.*state_dict", lambda: build_network(PUBLISHED, {})),
     "pt-nothing": _pickle("20 missing", dict),
     "pt-integers": _pickle("wrong type.*int64", lambda: _published(_BIAS, lambda t: t.long())),
     "pt-sparse": _pickle("not a state dict of dense", lambda: _published(_BIAS, _sparse)),

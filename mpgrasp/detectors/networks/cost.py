@@ -36,7 +36,7 @@ are not counted. More input channels only enlarge the first convolution.
   (a half), coarsest (1/32) and blocks per resolution, and nearly its parameters and GFLOP; they differ from
   each other in the residual blocks or the skip connections alone.
 - `tfgrasp` is laid out for 224x224; `ggcnn` was designed for 300x300 and takes any multiple of 12, `ggcnn2`
-  of 4, the others of 32.
+  and `grconvnet` of 4, the others of 32.
 """
 
 

@@ -29,6 +29,8 @@ class PublishedWeights:
     """Opening that a width output of 1 stands for, in pixels of the network's own image [px]."""
     card: Mapping[str, str]
     """Training data, source and licence."""
+    sizes: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    """Settings that are read from the shape of a tensor: its name, and the axis."""
 
 
 @dataclass(frozen=True, kw_only=True)

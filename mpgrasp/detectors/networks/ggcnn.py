@@ -112,7 +112,12 @@ DECLARATIONS = {
         source="[GG-CNN](https://arxiv.org/abs/1804.05172)",
         input_size=300,
         multiple_of=12,
-        published=PublishedWeights(entry="conv1.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD),
+        published=PublishedWeights(
+            entry="convt3.weight",
+            width_px=_PUBLISHED_WIDTH_PX,
+            card=_PUBLISHED_CARD,
+            sizes={"channels": ("conv1.weight", 1)},
+        ),
     ),
     "ggcnn2": NetworkDeclaration(
         network=GGCNN2,
@@ -120,7 +125,10 @@ DECLARATIONS = {
         source="[GG-CNN2](https://doi.org/10.1177/0278364919859066)",
         multiple_of=4,
         published=PublishedWeights(
-            entry="features.0.weight", width_px=_PUBLISHED_WIDTH_PX, card=_PUBLISHED_CARD
+            entry="features.0.weight",
+            width_px=_PUBLISHED_WIDTH_PX,
+            card=_PUBLISHED_CARD,
+            sizes={"channels": ("features.0.weight", 1)},
         ),
     ),
 }

@@ -24,6 +24,7 @@ NETWORKS: dict[str, str] = {
     "tfgrasp": "mpgrasp.detectors.networks.tfgrasp",
     "ggcnn": "mpgrasp.detectors.networks.ggcnn",
     "ggcnn2": "mpgrasp.detectors.networks.ggcnn",
+    "grconvnet": "mpgrasp.detectors.networks.grconvnet",
     "fcn": "mpgrasp.detectors.networks.fcn",
     "fcn_residual": "mpgrasp.detectors.networks.fcn",
     "unet": "mpgrasp.detectors.networks.unet",

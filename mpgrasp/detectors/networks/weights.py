@@ -15,7 +15,7 @@ from torch import nn
 
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks.description import FORMAT, opened, read_description
-from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
 from mpgrasp.detectors.networks.registry import (
     NETWORKS,
     build_network,
@@ -30,7 +30,7 @@ from mpgrasp.detectors.networks.state import (
     needed_entries,
     stored_entries,
 )
-from mpgrasp.exceptions import OutputError, WeightsError
+from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 from mpgrasp.files.json_values import json_value
 
 WIDTH_SHARE = 0.5
@@ -134,6 +134,13 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
         # weights_only: a pickle from elsewhere must not run code
         state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no common base for what a junk file may raise
+        if "Unsupported global" in str(error):  # a whole module, whose pickle would run code
+            raise WeightsError(
+                "a pickled module, which could run any code when it is read",
+                got=str(path),
+                allowed=f"{allowed}; if you trust it, make one where its code is installed: torch.save(torch"
+                ".load(IN, weights_only=False, map_location='cpu').state_dict(), OUT)",
+            ) from error
         raise WeightsError("not a PyTorch file of tensors", got=str(path), allowed=allowed) from error
     if not (isinstance(state, dict) and all(map(_is_tensor, state.items()))):
         raise WeightsError(
@@ -144,18 +151,36 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
             published = declaration(other).published
             if published is not None and published.entry in state:
                 raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
-    network = build_network(name, {})
-    check_entries(entries(state), entries(network.state_dict()), path)
+    settings = {setting: _size(state, *place) for setting, place in declared.published.sizes.items()}
+    settings = {key: value for key, value in settings.items() if value is not None}
+    modality = next((kind for kind, n in CHANNELS.items() if n == settings.get("channels", 1)), None)
+    if modality is None:
+        raise WeightsError(
+            f"{path}: weights for images of {settings['channels']} channels",
+            allowed=str(sorted(CHANNELS.values())),
+        )
+    try:
+        needed = needed_entries(name, settings)
+    except ConfigError as error:
+        raise WeightsError(f"{path}: {error}") from error
+    check_entries(entries(state), needed, path)
     check_numbers(state, path)
+    network = build_network(name, settings)
     network.load_state_dict(state)
     return NetworkWeights(
         name=name,
         network=network,
-        settings={},
-        input=NetworkInput(size=declared.input_size),
+        settings=settings,
+        input=NetworkInput(size=declared.input_size, modality=modality),
         width_px=declared.published.width_px,
         card=declared.published.card,
     )
+
+
+def _size(state: Mapping[str, torch.Tensor], entry: str, axis: int) -> int | None:
+    """Return the size of a tensor along an axis; None where there is none."""
+    shape = state[entry].shape if entry in state else ()
+    return int(shape[axis]) if axis < len(shape) else None
 
 
 def _is_tensor(item: tuple[object, object]) -> bool:

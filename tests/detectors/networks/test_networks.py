@@ -26,6 +26,7 @@ SMALL: dict[str, tuple[str, dict[str, Any], int]] = {
     "tfgrasp": ("tfgrasp", {"size": SIZE, "embed": 8, "window": 2}, SIZE),
     "ggcnn": ("ggcnn", {}, 60),
     "ggcnn2": ("ggcnn2", {}, SIZE),
+    "grconvnet": ("grconvnet", {"features": 4}, SIZE),
     "fcn": ("fcn", FCN, SIZE),
     "fcn_residual": ("fcn_residual", FCN, SIZE),
     "unet": ("unet", FCN, SIZE),

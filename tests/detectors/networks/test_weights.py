@@ -58,11 +58,32 @@ def test_published_state_dicts_load_unchanged(name: str, size: int, suffix: str,
     torch.save(network.state_dict(), tmp_path / f"published.{suffix}")
     weights = load_weights(name, tmp_path / f"published.{suffix}")
     assert weights.name == name
-    assert weights.settings == {}
+    assert weights.settings["channels"] == 1
     assert weights.input == NetworkInput(size=size, centre="mean", clip=1.0, scale=1.0)
     assert weights.width_px == 150.0
     for key, value in network.state_dict().items():
         assert torch.equal(weights.network.state_dict()[key], value)
+
+
+@pytest.mark.parametrize(("channels", "modality"), [(1, "d"), (3, "rgb"), (4, "rgbd")])
+@pytest.mark.parametrize("settings", [{}, {"features": 8}])
+def test_a_published_state_dict_tells_its_modality_and_its_width(
+    channels: int, modality: str, settings: dict[str, int], tmp_path: Path
+) -> None:
+    network = build_network("grconvnet", {"channels": channels, **settings})
+    torch.save(network.state_dict(), tmp_path / "published.pt")
+    weights = load_weights("grconvnet", tmp_path / "published.pt")
+    assert weights.input.modality == modality
+    assert weights.settings == {"channels": channels, "features": settings.get("features", 32)}
+    x = torch.randn(1, channels, 32, 32)
+    with torch.inference_mode():
+        assert torch.equal(torch.cat(weights.network(x)), torch.cat(network.eval()(x)))
+
+
+def test_a_published_state_dict_for_images_of_two_channels_is_refused(tmp_path: Path) -> None:
+    torch.save(build_network("grconvnet", {"channels": 2}).state_dict(), tmp_path / "published.pt")
+    with pytest.raises(WeightsError, match="2 channels"):
+        load_weights("grconvnet", tmp_path / "published.pt")
 
 
 @pytest.mark.parametrize(("name", "right"), [("ggcnn", "ggcnn2"), ("ggcnn2", "ggcnn")])
