@@ -19,6 +19,7 @@ published GG-CNN code and in the Cornell and Jacquard annotations: direction (du
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -190,12 +191,41 @@ class GraspRectangle:
         mine, theirs = self.width_px * self.jaw_px, other.width_px * other.jaw_px
         if min(mine, theirs) <= 0:
             return 0.0
-        # single precision: keep the numbers small by measuring from this centre
-        origin = np.array([self.u, self.v])
-        shared, _ = cv2.intersectConvexConvex(
-            (self.corners() - origin).astype(np.float32), (other.corners() - origin).astype(np.float32)
-        )
-        return float(np.clip(shared / (mine + theirs - shared), 0.0, 1.0))
+        shared = _area(self._clipped(other))
+        return min(max(shared / (mine + theirs - shared), 0.0), 1.0)
+
+    def _clipped(self, other: GraspRectangle) -> list[tuple[float, float]]:
+        """Return the polygon that both share, in this rectangle's own axes, from its centre [px]."""
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        shifted = (other.corners() - (self.u, self.v)).tolist()
+        polygon = [(cos * u - sin * v, sin * u + cos * v) for u, v in shifted]
+        for axis, bound in ((0, self.width_px / 2), (1, self.jaw_px / 2)):
+            for sign in (1.0, -1.0):
+                polygon = _cut(polygon, axis, sign, bound)
+        return polygon
+
+
+def _cut(
+    polygon: list[tuple[float, float]], axis: int, sign: float, bound: float
+) -> list[tuple[float, float]]:
+    """Return the part of a convex polygon whose coordinate of an axis, times a sign, is at most a bound."""
+    kept: list[tuple[float, float]] = []
+    for (a, b), here, there in (
+        ((p, q), bound - sign * p[axis], bound - sign * q[axis])
+        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    ):
+        if here >= 0:
+            kept.append(a)
+        if here * there < 0:
+            share = here / (here - there)
+            kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+    return kept
+
+
+def _area(polygon: list[tuple[float, float]]) -> float:
+    """Return the area of a polygon, by the shoelace formula."""
+    pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    return abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs)) / 2
 
 
 def best_pixel(quality: FloatArray) -> tuple[int, int]:
