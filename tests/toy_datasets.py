@@ -1,4 +1,4 @@
-"""Tiny datasets in the formats of Cornell and Jacquard, made here: one box on a table in every image."""
+"""Tiny datasets in the formats of all readers, made here: one box on a table in every image."""
 
 from __future__ import annotations
 
@@ -74,4 +74,34 @@ def write_jacquard(folder: Path, count: int = 3) -> Path:
         theta = -np.rad2deg(grasp.angle)
         good = f"{grasp.u};{grasp.v};{theta};{grasp.width_px};{grasp.jaw_px}\n"
         Path(f"{stem}_grasps.txt").write_text(good + "1;2;nan;3;4\n1;2;3;0;4\n")
+    return folder
+
+
+def write_multi_object(folder: Path, count: int = 3) -> Path:
+    """Write a dataset like the multi-object one: images and annotations in folders of their own."""
+    for name in ("rgbd", "annotations"):
+        (folder / name).mkdir(parents=True)
+    for k in range(count):
+        angle = 0.4 * k
+        depth = np.rint(1000 * box(angle, (480, 640))).astype(np.uint16)
+        cv2.imwrite(str(folder / "rgbd" / f"rgb_{k:04d}.jpg"), np.full((480, 640, 3), 200, np.uint8))
+        cv2.imwrite(str(folder / "rgbd" / f"depth_{k:04d}.png"), depth)
+        corners = grasp_of(angle, (480, 640)).corners()
+        text = "".join(f"{u:.4f} {v:.4f}\n" for u, v in corners)
+        (folder / "annotations" / f"rgb_{k:04d}_annotations.txt").write_text(text)
+        (folder / "annotations" / f"rgb_{k:04d}_annotations.txt~").write_text("1 2\n")
+    return folder
+
+
+def write_frames(folder: Path) -> Path:
+    """Write three depth images of one's own: npy with a label, TIFF with colour, PNG in millimetres."""
+    (folder / "more").mkdir(parents=True)
+    shape = (300, 400)
+    np.save(folder / "a.npy", box(0.0, shape))
+    grasp = grasp_of(0.0, shape)
+    theta = -np.rad2deg(grasp.angle)
+    (folder / "a_grasps.txt").write_text(f"{grasp.u};{grasp.v};{theta};{grasp.width_px};{grasp.jaw_px}\n")
+    cv2.imwrite(str(folder / "b.tiff"), box(0.4, shape))
+    cv2.imwrite(str(folder / "b_RGB.png"), np.full((*shape, 3), 200, np.uint8))
+    cv2.imwrite(str(folder / "more" / "c.png"), np.rint(1000 * box(0.8, shape)).astype(np.uint16))
     return folder

@@ -52,18 +52,25 @@ class Cornell:
         """Numbers of the images, as texts of four digits."""
         return list(self._folders)
 
+    def object_of(self, name: str) -> str:
+        return self._objects.get(int(name), name)
+
     def read(self, name: str) -> LabelledImage:
         folder = self._folders[name]
         rectangles = read_rectangles(folder / f"pcd{name}cpos.txt")
         tiff, cloud = folder / f"pcd{name}d.tiff", folder / f"pcd{name}.txt"
-        depth = read_depth(tiff)[0] if tiff.is_file() or not cloud.is_file() else read_point_cloud(cloud)
+        if tiff.is_file() or not cloud.is_file():
+            depth, unit = read_depth(tiff)
+        else:
+            depth, unit = read_point_cloud(cloud), "mm"
         return LabelledImage(
             name=name,
-            object=self._objects.get(int(name), name),
+            object=self.object_of(name),
             depth=depth,
             rgb=read_rgb(folder / f"pcd{name}r.png"),
             rectangles=rectangles,
             focal_px=FOCAL,
+            unit=unit,
         )
 
 

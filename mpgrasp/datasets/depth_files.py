@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import cv2
@@ -53,7 +54,24 @@ def read_depth(path: Path) -> tuple[NDArray[np.float32], str]:
     Raises:
         BrokenImageError: it is missing, no depth image, or has no return at all.
     """
-    image = read_image(path)
+    return _in_metres(path, read_image(path))
+
+
+def read_depth_array(path: Path) -> tuple[NDArray[np.float32], str]:
+    """Return the depth image in a .npy file, like `read_depth`.
+
+    Raises:
+        BrokenImageError: it is missing, no depth image, or has no return at all.
+    """
+    try:
+        return _in_metres(path, np.load(io.BytesIO(read_regular(path, LARGEST)), allow_pickle=False))
+    except OSError as error:
+        raise BrokenImageError(f"{path.name}: {error.strerror}") from error
+    except (ValueError, EOFError) as error:
+        raise BrokenImageError(f"{path.name}: no array of numbers ({error})") from error
+
+
+def _in_metres(path: Path, image: NDArray[np.generic]) -> tuple[NDArray[np.float32], str]:
     if image.ndim != 2 or image.dtype.kind not in "uif":
         raise BrokenImageError(f"{path.name}: no depth image, {image.dtype} {image.shape}")
     values = image.astype(np.float32)

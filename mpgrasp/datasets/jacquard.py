@@ -57,17 +57,21 @@ class Jacquard:
         """Names of the images, NUMBER_OBJECT."""
         return list(self._folders)
 
+    def object_of(self, name: str) -> str:
+        return name.partition("_")[2] or name
+
     def read(self, name: str) -> LabelledImage:
         folder = self._folders[name]
         rectangles = read_grasps(folder / f"{name}{_GRASPS}")
-        depth, _ = read_depth(folder / f"{name}_{self._depth}_depth.tiff")
+        depth, unit = read_depth(folder / f"{name}_{self._depth}_depth.tiff")
         return LabelledImage(
             name=name,
-            object=name.partition("_")[2] or name,
+            object=self.object_of(name),
             depth=depth,
             rgb=read_rgb(folder / f"{name}{_RGB}"),
             rectangles=rectangles,
             focal_px=FOCAL_SHARE * depth.shape[1],
+            unit=unit,
         )
 
 

@@ -30,6 +30,8 @@ class LabelledImage:
     """Labelled grasps, in pixels of this image."""
     focal_px: float
     """Focal length of the camera, by which pixels become metres [px]."""
+    unit: str = "m"
+    """Unit in which the depth was stored, which was found out."""
 
     def __post_init__(self) -> None:
         if self.rgb is not None and self.rgb.shape != (*self.depth.shape, 3):

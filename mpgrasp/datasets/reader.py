@@ -25,6 +25,10 @@ class Reader(Protocol):
         """Names of the images, in a fixed order."""
         ...
 
+    def object_of(self, name: str) -> str:
+        """Return what is on an image, so that splits by object are possible."""
+        ...
+
     def read(self, name: str) -> LabelledImage:
         """Return an image.
 

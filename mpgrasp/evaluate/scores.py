@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from mpgrasp.datasets.folds import spread
 from mpgrasp.datasets.labelled_image import LabelledImage
 from mpgrasp.datasets.rectangle_metric import best_iou, right
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.evaluate.predict import grasps
+from mpgrasp.evaluate.predict import Square, grasps
 from mpgrasp.grasp import GraspRectangle
 from mpgrasp.statistics import holm, mcnemar, wilson_interval
 
@@ -34,6 +36,18 @@ class ImageScore:
     """Greatest overlap of the best grasp with a label whose angle agrees."""
     border: bool
     """The best grasp lies within `BORDER` of the image's edge, where there is seldom an object."""
+    labelled: bool = True
+    """The image has labels; without, top1, top5 and iou say nothing, and it counts for no rate by them."""
+    fold: int | None = None
+    """Fold of the image, from 1; None without folds."""
+    u: float = math.nan
+    """Best grasp in the whole image: column of its centre [px] ..."""
+    v: float = math.nan
+    """... row [px] ..."""
+    angle: float = math.nan
+    """... closing direction, counter-clockwise on screen [rad] ..."""
+    width_px: float = math.nan
+    """... and opening [px]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +79,12 @@ class PairedTest:
     """McNemar's exact test, after Holm's correction over all pairs."""
 
 
-def score(detectors: Mapping[str, GraspDetector], image: LabelledImage) -> list[ImageScore]:
-    """Return the score of every detector on a square image."""
-    rows = []
+def score(detectors: Mapping[str, GraspDetector], seen: Square, fold: int | None = None) -> list[ImageScore]:
+    """Return the score of every detector on a square of an image, which may be of a fold."""
+    rows, image = [], seen.image
     for name, detector in detectors.items():
         found = grasps(detector, image, TOP)
+        best = seen.back(found[0])
         rows.append(
             ImageScore(
                 image=image.name,
@@ -79,6 +94,12 @@ def score(detectors: Mapping[str, GraspDetector], image: LabelledImage) -> list[
                 top5=right(found, image.rectangles),
                 iou=best_iou(found[0], image.rectangles),
                 border=_at_border(found[0], image),
+                labelled=bool(image.rectangles),
+                fold=fold,
+                u=best.u,
+                v=best.v,
+                angle=best.angle,
+                width_px=best.width_px,
             )
         )
     return rows
@@ -92,16 +113,25 @@ def _at_border(grasp: GraspRectangle, image: LabelledImage) -> bool:
 def rates(rows: Sequence[ImageScore], detector: str) -> dict[str, Rate]:
     """Return the rates of a detector by the name of the column: top1, top5, and best grasps at the border."""
     mine = [row for row in rows if row.detector == detector]
-    return {
-        key: Rate(count=sum(getattr(row, key) for row in mine), n=len(mine))
-        for key in ("top1", "top5", "border")
-    }
+    labelled = [row for row in mine if row.labelled]
+    of = {"top1": labelled, "top5": labelled, "border": mine}
+    return {key: Rate(count=sum(getattr(row, key) for row in some), n=len(some)) for key, some in of.items()}
+
+
+def fold_spread(rows: Sequence[ImageScore], detector: str) -> tuple[float, float] | None:
+    """Return mean and standard deviation of `top1` over the folds; None without folds."""
+    by_fold: dict[int, list[bool]] = {}
+    for row in rows:
+        if row.detector == detector and row.fold is not None and row.labelled:
+            by_fold.setdefault(row.fold, []).append(row.top1)
+    return spread(sum(right) / len(right) for right in by_fold.values()) if by_fold else None
 
 
 def paired_tests(rows: Sequence[ImageScore]) -> list[PairedTest]:
     """Return the test of every two detectors."""
     names = list(dict.fromkeys(row.detector for row in rows))
-    right_by = {name: {row.image: row.top1 for row in rows if row.detector == name} for name in names}
+    labelled = [row for row in rows if row.labelled]
+    right_by = {name: {row.image: row.top1 for row in labelled if row.detector == name} for name in names}
     counts = []
     for a, b in combinations(names, 2):
         common = right_by[a].keys() & right_by[b].keys()

@@ -9,15 +9,29 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from toy_datasets import TABLE, box, grasp_of, write_cornell, write_jacquard, write_point_cloud
+from toy_datasets import (
+    TABLE,
+    box,
+    grasp_of,
+    write_cornell,
+    write_frames,
+    write_jacquard,
+    write_multi_object,
+    write_point_cloud,
+)
+from toy_shards import write_shards
 
 from mpgrasp.datasets.cornell import Cornell, from_corners
-from mpgrasp.datasets.depth_files import read_depth, read_point_cloud
+from mpgrasp.datasets.depth_files import read_depth, read_depth_array, read_point_cloud
+from mpgrasp.datasets.depth_folder import FOCAL_SHARE, DepthFolder
+from mpgrasp.datasets.generated import STEP, Generated
 from mpgrasp.datasets.jacquard import Jacquard
 from mpgrasp.datasets.labelled_image import LabelledImage, window
+from mpgrasp.datasets.multi_object import MultiObject
 from mpgrasp.datasets.reader import BrokenImageError, Reader, Skipped, usable
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference
+from mpgrasp.training.data.labels import decode_angle
 
 
 def cornell(tmp_path: Path) -> Reader:
@@ -28,7 +42,11 @@ def jacquard(tmp_path: Path) -> Reader:
     return Jacquard(write_jacquard(tmp_path / "a folder"))
 
 
-@pytest.mark.parametrize("made", [cornell, jacquard])
+def multi_object(tmp_path: Path) -> Reader:
+    return MultiObject(write_multi_object(tmp_path / "a folder"))
+
+
+@pytest.mark.parametrize("made", [cornell, jacquard, multi_object])
 def test_a_dataset_has_the_images_and_the_labels_that_were_written(
     made: Callable[[Path], Reader], tmp_path: Path
 ) -> None:
@@ -44,7 +62,64 @@ def test_a_dataset_has_the_images_and_the_labels_that_were_written(
         assert label.iou(true) > 0.99
         assert image.rgb is not None
         assert np.nanmedian(image.depth) == pytest.approx(TABLE, abs=1e-3)
-    assert len({image.object for image in images}) == 2
+    assert [image.object for image in images] == [reader.object_of(name) for name in reader.names]
+    assert len({image.object for image in images}) == (3 if isinstance(reader, MultiObject) else 2)
+
+
+def test_a_folder_of_frames_has_labels_and_colour_where_they_lie_beside_the_depth(tmp_path: Path) -> None:
+    reader = DepthFolder(write_frames(tmp_path / "my frames"))
+    images = {name: reader.read(name) for name in reader.names}
+    assert list(images) == ["a", "b", "more/c"]
+    assert [image.unit for image in images.values()] == ["m", "m", "mm"]
+    assert [len(image.rectangles) for image in images.values()] == [1, 0, 0]
+    assert [image.rgb is not None for image in images.values()] == [False, True, False]
+    assert images["a"].rectangles[0].iou(grasp_of(0.0, (300, 400))) > 0.99
+    assert images["b"].focal_px == FOCAL_SHARE * 400
+    assert DepthFolder(tmp_path / "my frames", 321.0).read("b").focal_px == 321.0
+    for image in images.values():
+        assert np.nanmedian(image.depth) == pytest.approx(TABLE, abs=1e-3)
+
+
+@pytest.mark.parametrize("array", [np.zeros((4, 5)), np.full((4, 5, 3), 1.0), np.array([object()]), "junk"])
+def test_an_array_that_is_no_depth_image_is_broken(array: np.ndarray | str, tmp_path: Path) -> None:
+    path = tmp_path / "d.npy"
+    if isinstance(array, str):
+        path.write_text(array)
+    else:
+        np.save(path, array)
+    with pytest.raises(BrokenImageError, match=r"d\.npy"):
+        read_depth_array(path)
+    with pytest.raises(BrokenImageError, match=r"absent\.npy"):
+        read_depth_array(tmp_path / "absent.npy")
+
+
+def test_generated_data_have_rectangles_where_labels_are_good(tmp_path: Path) -> None:
+    reader = Generated(write_shards(tmp_path / "set", shards=2, images=3))
+    assert len(reader.names) == 6
+    assert reader.object_of(reader.names[4]) == "scene 4"
+    for name in reader.names:
+        image = reader.read(name)
+        path, row = tmp_path / "set" / f"shard_{name[:5]}.npz", int(name[6:])
+        with np.load(path) as file:
+            quality, angle, width = (file[key][row] for key in ("quality", "angle", "width"))
+        good = quality >= 0.5 * quality.max()
+        assert len(image.rectangles) == good[::STEP, ::STEP].sum()
+        for rectangle in image.rectangles:
+            at = round(rectangle.v), round(rectangle.u)
+            assert good[at]
+            assert rectangle.width_px == width[at]
+            assert rectangle.angle == decode_angle(angle)[at]
+    with pytest.raises(ConfigError, match="no shards"):
+        Generated(tmp_path)
+
+
+@pytest.mark.parametrize("missing", ["rgb_0001.jpg", "depth_0001.png"])
+def test_a_multi_object_image_without_its_pair_is_left_out(missing: str, tmp_path: Path) -> None:
+    folder = write_multi_object(tmp_path / "m")
+    (folder / "rgbd" / missing).unlink()
+    skipped = Skipped()
+    assert [image.name for image in usable(MultiObject(folder), skipped)] == ["0000", "0002"]
+    assert missing.partition(".")[0] in skipped.reasons["0001"]
 
 
 def test_a_point_cloud_has_the_depth_of_its_tiff_but_for_the_points_that_it_lacks(tmp_path: Path) -> None:
