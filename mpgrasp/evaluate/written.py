@@ -131,7 +131,13 @@ def _page(title: str, command: str, table: Rows, lines: Sequence[str], pictures:
     """Return one HTML page that needs nothing else."""
     style = files("mpgrasp.bench.report").joinpath("templates", "style.css").read_text(encoding="utf-8")
     heading, *body = table
-    cells = [Markup("").join(Markup("<td>{}</td>").format(cell) for cell in row) for row in body]
+    cells = [
+        Markup("").join(
+            Markup('<td data-label="{}">{}</td>').format(title, cell)
+            for title, cell in zip(heading, row, strict=True)
+        )
+        for row in body
+    ]
     captions = {
         "predictions": "Predictions. Of each image: the labels and the best five grasps of every detector "
         "(blue, orange, green, red, purple); below, depth, and quality, angle and width.",

@@ -19,7 +19,9 @@ from mpgrasp.bench.report.ladder import LadderSection, ladder_sections
 from mpgrasp.bench.report.motion_figures import SuiteMotion, motion_figures
 from mpgrasp.bench.report.orderings import Orderings, orderings, pair_table
 from mpgrasp.bench.report.outcome_figures import outcome_figures
+from mpgrasp.bench.report.pair_matrix import pair_matrices
 from mpgrasp.bench.report.paper_tables import PaperTables, paper_tables
+from mpgrasp.bench.report.recordings import Recording, recordings
 from mpgrasp.bench.report.run_tables import (
     card_differences,
     card_tables,
@@ -67,6 +69,8 @@ class Report:
     paper: PaperTables
     orderings: Orderings
     pairs: Table | None
+    matrices: Sequence[Table]
+    """The same by suite, where enough methods met."""
     outcomes: Mapping[str, Sequence[Figure]]
     """Figures by suite; none where nothing could be played."""
     motion: Table
@@ -77,6 +81,7 @@ class Report:
     films: Films
     not_drawn: str
     """Sentence on figures that are left out; empty where none is."""
+    recordings: Sequence[Recording]
     failures: Table | None
     runs: Table
     commands: Sequence[str]
@@ -100,17 +105,18 @@ def write_report(folders: Sequence[Path], out: Path) -> Path:
     runs = find_runs(folders)
     with _writing(out / FILES[0]):  # or it would be known only once all is drawn
         pass
-    report = make_report(runs)
+    report = make_report(runs, out)
     for name, text in zip(FILES, (to_html(report), to_markdown(report)), strict=True):
         _replace(out / name, text)
     return out / FILES[0]
 
 
-def make_report(runs: Runs) -> Report:
-    """The report on some runs, as text, numbers and figures."""
+def make_report(runs: Runs, out: Path | None = None) -> Report:
+    """The report on some runs, as text, numbers and figures; recordings are linked from a folder `out`."""
     evaluation = Evaluation.of(runs)
     ladders = (run.configuration.ladder for run in runs.runs)
     rungs = {point for card in ladders if card is not None for point in card.points}
+    tests = [test for test in evaluation.tests if test.suite not in rungs]
     drawn = runs.suites if len(runs.suites) <= DRAWN else []
     kept = read_traces(runs) if drawn else NO_TRACES
     return Report(
@@ -125,7 +131,8 @@ def make_report(runs: Runs) -> Report:
         refused_meshes=refused_meshes_table(runs),
         paper=paper_tables(evaluation),
         orderings=orderings({baseline: evaluate(runs.cells, baseline=baseline) for baseline in Baseline}),
-        pairs=pair_table([test for test in evaluation.tests if test.suite not in rungs]),
+        pairs=pair_table(tests),
+        matrices=pair_matrices(tests),
         outcomes={suite: outcome_figures(evaluation, suite) for suite in drawn},
         motion=motion_table(evaluation),
         motion_by_suite=[motion_figures(evaluation, suite, kept) for suite in drawn],
@@ -134,6 +141,7 @@ def make_report(runs: Runs) -> Report:
         ticks=tick_times(runs),
         films=filmstrips(runs, kept) if drawn else NO_FILMS,
         not_drawn="" if drawn else _not_drawn_text(runs),
+        recordings=recordings(runs, out),
         failures=failure_table(runs),
         runs=run_table(runs),
         commands=[run.about.command for run in runs.runs],
