@@ -49,8 +49,13 @@ PROGRAMMES: dict[str, Programme] = {
         suites=("single", "unseen", "thin", "stacked"),
         detectors=("ggcnn", "tfgrasp", "dhrnet"),
         controllers=tuple(chain(*map(controllers_of, Baseline))),
-        # the ceiling, and the floor: one look and no closed loop
-        references=(Method("oracle", "mppc"), Method("dhrnet", "open_loop")),
+        # the ceiling, and the floors: one look and no closed loop, nothing learned, no way to the side
+        references=(
+            Method("oracle", "mppc"),
+            Method("dhrnet", "open_loop"),
+            Method("heuristic", "mppc_robust"),
+            Method("dhrnet", "straight_down"),
+        ),
     ),
 }
 """Programmes by name."""

@@ -50,7 +50,7 @@ PUBLISHED, ROBUST = ("mvp", "mppc"), ("mvp_robust", "mppc_robust")
     ("baseline", "controllers"),
     [(None, (*PUBLISHED, *ROBUST)), (Baseline.PUBLISHED, PUBLISHED), (Baseline.ROBUST, ROBUST)],
 )
-def test_the_paper_is_three_detectors_with_the_controllers_of_its_baselines_a_ceiling_and_a_floor(
+def test_the_paper_is_three_detectors_with_the_controllers_of_its_baselines_a_ceiling_and_floors(
     baseline: Baseline | None, controllers: tuple[str, ...]
 ) -> None:
     paper = PROGRAMMES["paper"]
@@ -60,6 +60,8 @@ def test_the_paper_is_three_detectors_with_the_controllers_of_its_baselines_a_ce
         *cells,
         ("oracle", "mppc"),
         ("dhrnet", "open_loop"),
+        ("heuristic", "mppc_robust"),
+        ("dhrnet", "straight_down"),
     ]
 
 
