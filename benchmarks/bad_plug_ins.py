@@ -332,12 +332,9 @@ for _ in range(3):
     "no-such-class": _given_as("has no class 'Heur'.*allowed: Sound, Bad", "{module}:Heur"),
     "no-class": _given_as("has no such name; got '{module}:'".replace("{module}", r"\w+"), "{module}:"),
     "not-a-class": _given_as("has no class 'np'", "{module}:np"),
-    "by-file": _given_as(
-        r"named by its module, not by its file.*allowed: \w+:Bad from the folder of \w+\.py",
-        "./{module}.py:Bad",
-    ),
-    "by-path": _given_as("allowed: .*:Bad with PYTHONPATH=.* or from the folder", "{folder}/{module}.py:Bad"),
-    "by-file-alone": _given_as(r"named by its module.*allowed: \w+:Class", "{module}.py"),
+    "by-file": _given_as(r"no such file of a detector plug-in; got 'absent\.py'", "./absent.py:Bad"),
+    "by-path": _given_as("has no class 'Heur'.*allowed: Sound, Bad", "{folder}/{module}.py:Heur"),
+    "by-file-alone": _given_as(r"names no class.*allowed: \w+\.py:Class", "{module}.py"),
     "needs-arguments": _detector(
         "cannot be made .TypeError.*missing 1 required", "def __init__(self, weights): pass", by="loader"
     ),

@@ -31,6 +31,7 @@ from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import refuse_unknown
 from mpgrasp.grasp import GraspMap
+from mpgrasp.plugin_names import canonical
 from mpgrasp.plugins import check_name, detector_names, load_detector
 from mpgrasp.recording.watcher import Watcher
 from mpgrasp.settings.sharing import controller_settings, detector_settings
@@ -234,6 +235,7 @@ def _twist(action: ArrayLike) -> NDArray[np.float64]:
 
 def _named(name: str, suite: Suite) -> Callable[[], GraspDetector]:
     """Return what makes the detector of that name, with the settings that the suite has for it."""
+    name = canonical("detector", name)
     check_name("detector", name, detector_names())
     settings = detector_settings((name,), suite.detector)[name]
     return functools.partial(load_detector, name, settings=settings)

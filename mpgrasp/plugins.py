@@ -19,6 +19,7 @@ from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
 from mpgrasp.foreign_code import contained
+from mpgrasp.plugin_names import base_name, canonical, detectors_of
 
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
@@ -54,20 +55,15 @@ def controller_names() -> tuple[str, ...]:
 
 
 def check_name(kind: str, name: str, known: Iterable[str]) -> None:
-    """Raise ConfigError unless the name is in the registry or has the form of an import path."""
-    module, separator, class_name = name.partition(":")
-    file = module.endswith(".py") or "/" in module or "\\" in module
-    if not separator and name not in known and not file:
-        raise ConfigError(f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class"])
-    if file:
-        path = Path(module)
-        where = "" if path.parent == Path() else f" with PYTHONPATH={path.parent} or"
+    """Raise ConfigError unless the name is in the registry, with weights perhaps, or an import path."""
+    known, separator = tuple(known), ":" in name
+    if not separator:
+        if (base_name(name) if kind == "detector" else name) in known:
+            return
         raise ConfigError(
-            f"{kind} plug-in is named by its module, not by its file",
-            got=name,
-            allowed=f"{path.stem}:{class_name or 'Class'}{where} from the folder of {path.name}",
+            f"unknown {kind}", got=name, allowed=[*known, f"your own {kind} as module:Class or FILE.py:Class"]
         )
-    if separator and not _IMPORT_PATH.fullmatch(name):
+    if not _IMPORT_PATH.fullmatch(name):
         raise ConfigError(
             f"{kind} plug-in has no such name", got=name, allowed="module:Class, package.module:Class"
         )
@@ -82,7 +78,7 @@ def load_detector(
     """Return a detector, ready to use.
 
     Args:
-        name: in the registry, or an import path.
+        name: in the registry, an import path, a file, or an entry point (`plugin_names`).
         weights: file in place of the shipped one.
         runtime: what computes a network of the registry: auto, torch or openvino; a plug-in's is its
             own affair.
@@ -92,6 +88,10 @@ def load_detector(
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
         WeightsError: weights that are missing, unreadable or another network's.
     """
+    if weights is None:
+        (name,), own = detectors_of(name)
+        weights = own.get(name)
+    name = canonical("detector", name)
     check_name("detector", name, detector_names())
     if weights is not None:
         _check_readable(weights)
@@ -100,7 +100,7 @@ def load_detector(
 
         try:
             assert not isinstance(settings, Mapping)
-            return make_detector(name, weights, runtime, settings)
+            return make_detector(base_name(name), weights, runtime, settings)
         except MpgraspError:
             raise
         except Exception as error:  # a damaged file makes its reader fail in any way
@@ -119,12 +119,13 @@ def load_controller(name: str, settings: ReachConfig | Mapping[str, Any] | None 
     """Return a controller, ready to use.
 
     Args:
-        name: in the registry, or an import path.
+        name: in the registry, an import path, a file, or an entry point (`plugin_names`).
         settings: config of a controller of the registry, keyword arguments of a plug-in; None for its own.
 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
     """
+    name = canonical("controller", name)
     check_name("controller", name, controller_names())
     if ":" not in name:
         from mpgrasp.controllers import make_controller
@@ -223,13 +224,15 @@ def _check_call(what: str, path: str, method: Any, arguments: Sequence[str]) -> 
         ) from error
 
 
-def parse_weights(given: Sequence[str], detectors: Sequence[str]) -> dict[str, Path]:
-    """Return weights files by detector from `FILE` or `DETECTOR=FILE`.
+def parse_weights(
+    given: Sequence[str], detectors: Sequence[str], own: Mapping[str, Path] | None = None
+) -> dict[str, Path]:
+    """Return weights files by detector from `FILE` or `DETECTOR=FILE`, and those that they bring themselves.
 
     Raises:
         ConfigError: it is unclear or impossible whose weights they are.
     """
-    weights: dict[str, Path] = {}
+    weights = dict(own or {})
     for text in given:
         name, separator, file = text.partition("=")
         if not (separator and name in detectors):

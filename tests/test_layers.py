@@ -25,11 +25,11 @@ ORDER = (
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
     "controllers", "guards", "motion", "recording", "episode",
-    "suite", "plugins", "settings", "env", "inspection", "check",
+    "suite", "plugin_names", "plugins", "settings", "env", "inspection", "check",
     "training.data", "training", "datasets",
     "bench.ladders",
     "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
-    "bench.playing", "bench.profiling", "bench.commands", "bench", "evaluate",
+    "bench.playing", "bench.profiling", "bench.commands", "bench", "evaluate", "__main__",
 )  # fmt: skip
 """Rooms of the house from the ground up: each may import what stands before it."""
 

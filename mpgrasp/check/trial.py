@@ -19,6 +19,7 @@ from mpgrasp.check.laws import Law, try_laws
 from mpgrasp.check.verdict import Verdict
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.plugin_names import canonical
 from mpgrasp.plugins import check_name, controller_names, detector_names, load_controller, load_detector
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 
@@ -51,6 +52,7 @@ def try_detector(
     Raises:
         MpgraspError: it cannot be loaded or made ready.
     """
+    name = canonical("detector", name)
     check_name("detector", name, detector_names())
     own = detector_settings((name,), settings or {})[name]
 
@@ -71,6 +73,7 @@ def try_controller(name: str, settings: Mapping[str, Any] | None = None) -> Verd
     Raises:
         MpgraspError: it cannot be loaded.
     """
+    name = canonical("controller", name)
     check_name("controller", name, controller_names())
     own = controller_settings((name,), settings or {})[name]
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mpgrasp.command_line import run_command
-from mpgrasp.evaluate.options import check, detectors_of, make_parser, reader_of
+from mpgrasp.evaluate.options import check, make_detectors, make_parser, reader_of
 
 if TYPE_CHECKING:
     from mpgrasp.datasets.reader import Reader
@@ -48,7 +48,7 @@ def _as_they_are(options: argparse.Namespace, reader: Reader) -> tuple[Scored, d
     """Score detectors with the weights that they have."""
     from mpgrasp.evaluate.scoring import Scored
 
-    detectors, scored = detectors_of(options), Scored()
+    detectors, scored = make_detectors(options), Scored()
     folds = None if options.split is None else _folds(options, reader)
     scored.add(reader, detectors, side=options.side, limit=options.limit, strict=options.strict, folds=folds)
     return scored, detectors

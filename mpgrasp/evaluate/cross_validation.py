@@ -52,7 +52,7 @@ def trained_folds(
     """
     from mpgrasp.detectors.network_detector import NetworkDetector
 
-    names = detector_list(options)
+    names, _ = detector_list(options)
     for name in names:
         check_network(name)
     of_fold = members(folds, options.folds)

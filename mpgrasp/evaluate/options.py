@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpgrasp.command_line import COUNT, SEED, THREADS, Parser, number, whole
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.plugin_names import detectors_of
 
 if TYPE_CHECKING:
     from mpgrasp.datasets.reader import Reader
@@ -173,19 +174,19 @@ def reader_of(options: argparse.Namespace) -> Reader:
     return DepthFolder(options.path, options.focal)
 
 
-def detector_list(options: argparse.Namespace) -> list[str]:
-    """Return the names of the detectors.
+def detector_list(options: argparse.Namespace) -> tuple[list[str], dict[str, Path]]:
+    """Return the names of the detectors, and the weights that they bring.
 
     Raises:
         ConfigError: one of them is empty or there twice.
     """
-    names: list[str] = options.detector.split(",")
+    names, own = detectors_of(options.detector)
     if not all(names) or len(set(names)) < len(names):
         raise ConfigError("unusable list of detectors", got=options.detector, allowed="different detectors")
-    return names
+    return names, own
 
 
-def detectors_of(options: argparse.Namespace) -> dict[str, GraspDetector]:
+def make_detectors(options: argparse.Namespace) -> dict[str, GraspDetector]:
     """Return the detectors that options name.
 
     Raises:
@@ -194,8 +195,8 @@ def detectors_of(options: argparse.Namespace) -> dict[str, GraspDetector]:
     from mpgrasp.detectors.detector import reads_truth
     from mpgrasp.plugins import load_detector, parse_weights
 
-    names = detector_list(options)
-    weights = parse_weights(options.weights, names)
+    names, own = detector_list(options)
+    weights = parse_weights(options.weights, names, own)
     made = {name: load_detector(name, weights.get(name), options.runtime) for name in names}
     for name, detector in made.items():
         if reads_truth(detector):

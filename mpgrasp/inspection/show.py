@@ -11,6 +11,7 @@ from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replacing
 from mpgrasp.inspection.pictures import side_by_side
 from mpgrasp.inspection.viewpoint import Viewpoint, look
+from mpgrasp.plugin_names import detectors_of
 from mpgrasp.plugins import load_detector, parse_weights
 from mpgrasp.recording.recorder import claim_file
 from mpgrasp.settings.changes import with_assignments
@@ -24,7 +25,7 @@ GROUPS = ("scene", "sensor", "camera", "detector")
 
 def run(options: argparse.Namespace) -> int:
     """Draw what detectors make of one frame, and say it in a line for each; return the exit code."""
-    names = options.detector.split(",")
+    names, own = detectors_of(options.detector)
     if not all(names) or len(set(names)) < len(names):
         raise ConfigError("unusable list of detectors", got=options.detector, allowed="different detectors")
     suite = _suite(options)
@@ -37,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         camera=options.camera,
         noise=not options.no_noise,
     )
-    weights = parse_weights(options.weights, names)
+    weights = parse_weights(options.weights, names, own)
     settings = detector_settings(names, suite.detector)
     detectors = {
         name: load_detector(name, weights.get(name), options.runtime, settings[name]) for name in names

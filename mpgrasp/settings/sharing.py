@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import from_table
+from mpgrasp.plugin_names import base_name
 from mpgrasp.plugins import plug_in_class
 from mpgrasp.settings.effects import leaves, reason_idle
 
@@ -79,7 +80,7 @@ def detector_settings(
     """
     from mpgrasp.detectors import detector_defaults
 
-    bases = {name: detector_defaults(name) for name in names if ":" not in name}
+    bases = {name: detector_defaults(base_name(name)) for name in names if ":" not in name}
     keys = {name: tuple(field.name for field in fields(base)) for name, base in bases.items()}
     return _share("detector", names, table, bases, keys)
 

@@ -255,7 +255,7 @@ def test_the_command_prints_a_verdict_and_its_exit_code_says_it_too(
     [
         ([], "required: detector|controller"),
         (["detector", "resnet"], "unknown detector; got 'resnet'"),
-        (["controller", "./my.py:C"], "my:C from the folder of my.py"),
+        (["controller", "./my.py:C"], "no such file of a controller plug-in"),
         (["detector", "no_such_module:C"], "cannot be imported"),
         (["detector", "oracle", "--set", "controller.gamma=1"], "--set of another group"),
         (["detector", "oracle", "--set", "detector.crop=1"], "no setting of oracle"),

@@ -11,6 +11,7 @@ from mpgrasp.bench.commands.run import parse
 from mpgrasp.bench.playing.recorded_command import RACE
 from mpgrasp.command_line import Parser, number
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.plugin_names import method_of
 
 _EPILOG = """\
 examples:
@@ -67,9 +68,11 @@ class RaceParser:
         return arguments
 
     def _check(self, methods: Sequence[str], suite: str | None, arguments: argparse.Namespace) -> None:
-        if len(methods) != 2 or not all(name.count("/") == 1 for name in methods):
+        if len(methods) != 2:
             allowed = "DETECTOR/CONTROLLER DETECTOR/CONTROLLER"
             raise ConfigError("a race is of two methods", got=" ".join(methods), allowed=allowed)
+        for name in methods:
+            method_of(name)
         if methods[0] == methods[1]:
             raise ConfigError("a race of a method with itself", got=methods[0], allowed="two methods")
         if suite is None:

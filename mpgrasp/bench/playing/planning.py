@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.playing.sweep import Layout, lay_out
 from mpgrasp.bench.record import Method
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.plugin_names import canonical, detectors_of, method_of, names_of
 from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
 from mpgrasp.settings.changes import refuse_different_methods, with_assignments
 from mpgrasp.settings.grid import parse_grid
@@ -37,32 +38,39 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     Raises:
         ConfigError: input that cannot be used.
     """
-    detectors, controllers = (
-        None if names is None else tuple(names.split(","))
-        for names in (arguments.detector, arguments.controller)
-    )
-    for name in detectors or ():
+    only_detectors: Sequence[str] = ()
+    own: dict[str, Path] = {}
+    if arguments.detector is not None:
+        only_detectors, own = detectors_of(arguments.detector)
+    only_controllers: Sequence[str] = ()
+    if arguments.controller is not None:
+        only_controllers = names_of("controller", arguments.controller)
+    for name in only_detectors:
         check_name("detector", name, detector_names())
-    for name in controllers or ():
+    for name in only_controllers:
         check_name("controller", name, controller_names())
     only = None if arguments.suites is None else tuple(arguments.suites.split(","))
     if arguments.ladder:
-        return _ladder_plan(arguments, every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,)))
+        return _ladder_plan(
+            arguments, every_method(only_detectors or (DETECTOR,), only_controllers or (CONTROLLER,)), own
+        )
     suites, programme = load_suites(arguments.suite, only), PROGRAMMES.get(arguments.suite)
-    race = _race(arguments, suites) if arguments.race else None
-    if arguments.baseline is not None and (programme is None or controllers is not None):
+    race = None
+    if arguments.race:
+        race, own = _race(arguments, suites)
+    if arguments.baseline is not None and (programme is None or only_controllers):
         raise ConfigError(
             "--baseline says which controllers of a programme play",
             got=arguments.baseline,
             allowed=f"with {', '.join(PROGRAMMES)}, and without --controller",
         )
     if race is not None:
-        methods = tuple(map(method_named, arguments.race))
+        methods = tuple(map(method_named, (race.first, race.second)))
     elif programme is None:
-        methods = every_method(detectors or (DETECTOR,), controllers or (CONTROLLER,))
+        methods = every_method(only_detectors or (DETECTOR,), only_controllers or (CONTROLLER,))
     else:
         baseline = None if arguments.baseline is None else Baseline(arguments.baseline)
-        methods = programme.methods(detectors, controllers, baseline)
+        methods = programme.methods(only_detectors, only_controllers, baseline)
     suites, objects = _with_objects(suites, arguments)
     name = suites[0].name if programme is None else arguments.suite
     laid = _swept(suites, methods, arguments) if arguments.sweep else None
@@ -77,7 +85,7 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         programme=None if programme is None and laid is None else name,
         sweep=None if laid is None else laid.sweep,
         methods=methods,
-        weights=parse_weights(arguments.weights, detectors),
+        weights=parse_weights(arguments.weights, detectors, own),
         settings=_settings(suites, detectors, controllers, arguments.preset)
         if laid is None
         else laid.settings,
@@ -97,21 +105,30 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     return plan, out
 
 
-def _race(arguments: argparse.Namespace, suites: Sequence[Suite]) -> RaceCard:
-    """The race of a command line."""
+def _race(arguments: argparse.Namespace, suites: Sequence[Suite]) -> tuple[RaceCard, dict[str, Path]]:
+    """The race of a command line, and the weights that its detectors bring."""
     if len(suites) > 1:
         raise ConfigError("a race in several suites", got=arguments.suite, allowed="one suite")
-    first, second = arguments.race
-    for name in (first, second):
-        method = method_named(name)
+    typed = [method_of(name) for name in arguments.race]
+    detectors, own = detectors_of(",".join(dict.fromkeys(detector for detector, _ in typed)))
+    called = dict(zip(dict.fromkeys(detector for detector, _ in typed), detectors, strict=True))
+    first, second = (Method(called[detector], canonical("controller", name)) for detector, name in typed)
+    for method in (first, second):
         check_name("detector", method.detector, detector_names())
         check_name("controller", method.controller, controller_names())
-    return RaceCard(
-        first=first, second=second, alpha=arguments.alpha, max_episodes=arguments.max_episodes, step=RACE_STEP
+    card = RaceCard(
+        first=str(first),
+        second=str(second),
+        alpha=arguments.alpha,
+        max_episodes=arguments.max_episodes,
+        step=RACE_STEP,
     )
+    return card, own
 
 
-def _ladder_plan(arguments: argparse.Namespace, methods: tuple[Method, ...]) -> tuple[Plan, Path]:
+def _ladder_plan(
+    arguments: argparse.Namespace, methods: tuple[Method, ...], own: Mapping[str, Path]
+) -> tuple[Plan, Path]:
     """The plan of a ladder and the folder of its results."""
     if arguments.baseline is not None or arguments.suites is not None:
         option = "baseline" if arguments.suites is None else "suites"
@@ -124,7 +141,7 @@ def _ladder_plan(arguments: argparse.Namespace, methods: tuple[Method, ...]) -> 
         programme=laid.card.name,
         ladder=laid.card,
         methods=methods,
-        weights=parse_weights(arguments.weights, detectors),
+        weights=parse_weights(arguments.weights, detectors, own),
         settings=laid.settings,
         runtime=arguments.runtime,
         episodes=arguments.episodes,

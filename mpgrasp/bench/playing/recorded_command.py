@@ -16,6 +16,7 @@ from mpgrasp.bench.meshes.files import YCB
 from mpgrasp.bench.results.reader import read_run
 from mpgrasp.bench.results.run_card import RunDescription
 from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.plugin_names import WEIGHTS, method_of
 
 PROGRAM = ("python", "-m", "mpgrasp.bench")
 """First words of a recorded command."""
@@ -60,6 +61,16 @@ def recorded_arguments(folder: Path, parser: CommandParser, more: Sequence[str] 
         raise _no_command(folder)
     if arguments.suite.endswith(".toml"):
         arguments.suite = _find(arguments.suite, folder)
+    if arguments.detector is not None:
+        arguments.detector = ",".join(_find_plug_in(word, folder) for word in arguments.detector.split(","))
+    if arguments.controller is not None:
+        arguments.controller = ",".join(
+            _find_plug_in(word, folder) for word in arguments.controller.split(",")
+        )
+    if getattr(arguments, "race", ()):
+        arguments.race = tuple(
+            "/".join(_find_plug_in(word, folder) for word in method_of(name)) for name in arguments.race
+        )
     arguments.weights = added.weights or [_find_weights(text, folder) for text in before.weights]
     arguments.objects = added.objects or [
         word if word == YCB else _find(word, folder) for word in before.objects
@@ -88,6 +99,15 @@ def _find_weights(text: str, folder: Path) -> str:
     if separator and not _places(text, folder):
         return f"{name}={_find(file, folder)}"
     return _find(text, folder)
+
+
+def _find_plug_in(name: str, folder: Path) -> str:
+    """A detector or controller with a path that leads to its file, or to its weights; others as they are."""
+    file, colon, attribute = name.rpartition(":")
+    if file.endswith(".py"):
+        return f"{_find(file, folder)}{colon}{attribute}"
+    network, at, weights = name.partition(WEIGHTS)
+    return f"{network}{at}{_find(weights, folder)}" if at else name
 
 
 def _find(path: str, folder: Path) -> str:

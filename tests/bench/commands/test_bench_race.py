@@ -107,7 +107,7 @@ def test_a_race_is_resumed_as_a_race_and_nothing_else_is(
     [
         ([], "the following arguments are required: SUITE"),
         ([A], "a race is of two methods"),
-        ([A, "oracle", "--suite", "thin"], "a race is of two methods"),
+        ([A, "oracle", "--suite", "thin"], "unusable method; got 'oracle'"),
         ([A, A, "--suite", "thin"], "a race of a method with itself"),
         ([A, B], "the following arguments are required: --suite"),
         ([A, B, "--suite", "thick"], "unknown suite; got 'thick'"),
