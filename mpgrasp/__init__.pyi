@@ -1,5 +1,11 @@
 """Names of this package and where they live; `lazy_loader` loads each when it is first used."""
 
+from .api.evaluation import evaluate as evaluate
+from .api.results import Results as Results
+from .api.views import EpisodeView as EpisodeView
+from .api.views import SceneView as SceneView
+from .api.views import episode as episode
+from .api.views import scene as scene
 from .camera.noise import DepthNoise as DepthNoise
 from .camera.wrist_camera import WristCamera as WristCamera
 from .controllers import make_controller as make_controller

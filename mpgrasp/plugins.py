@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mpgrasp.brought import brought_names, brought_object
 from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
@@ -41,17 +42,17 @@ _IMPORT_PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
 def detector_names() -> tuple[str, ...]:
-    """Return the names in the registry of detectors."""
+    """Return the names in the registry of detectors, and of objects that were brought."""
     from mpgrasp.detectors import DETECTORS
 
-    return tuple(DETECTORS)
+    return (*DETECTORS, *brought_names("detector"))
 
 
 def controller_names() -> tuple[str, ...]:
-    """Return the names in the registry of controllers."""
+    """Return the names in the registry of controllers, and of objects that were brought."""
     from mpgrasp.controllers import CONTROLLERS
 
-    return tuple(CONTROLLERS)
+    return (*CONTROLLERS, *brought_names("controller"))
 
 
 def check_name(kind: str, name: str, known: Iterable[str]) -> None:
@@ -88,6 +89,10 @@ def load_detector(
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
         WeightsError: weights that are missing, unreadable or another network's.
     """
+    theirs: GraspDetector | None = brought_object("detector", name)
+    if theirs is not None:
+        _check_calls("detector", name, theirs, _DETECTOR_CALLS)
+        return theirs
     if weights is None:
         (name,), own = detectors_of(name)
         weights = own.get(name)
@@ -125,6 +130,10 @@ def load_controller(name: str, settings: ReachConfig | Mapping[str, Any] | None 
     Raises:
         ConfigError: an unknown name, or a plug-in that cannot be imported or made.
     """
+    theirs: Controller | None = brought_object("controller", name)
+    if theirs is not None:
+        _check_calls("controller", name, theirs, _CONTROLLER_CALLS)
+        return theirs
     name = canonical("controller", name)
     check_name("controller", name, controller_names())
     if ":" not in name:
@@ -194,6 +203,12 @@ def _make(kind: str, path: str, arguments: Mapping[str, Any], calls: _Calls) -> 
             got=path,
             allowed=f"a class that can be called as {call}",
         ) from error
+    _check_calls(kind, path, made, calls)
+    return made
+
+
+def _check_calls(kind: str, path: str, made: Any, calls: _Calls) -> None:
+    """Raise ConfigError if an object lacks a method, or one cannot be called as it is."""
     missing = [name for name in calls if not callable(getattr(made, name, None))]
     if missing:
         raise ConfigError(
@@ -201,7 +216,6 @@ def _make(kind: str, path: str, arguments: Mapping[str, Any], calls: _Calls) -> 
         )
     for name, names in {**calls, **_OPTIONAL_CALLS}.items():
         _check_call(f"{kind} plug-in's {name}", path, getattr(made, name, None), names)
-    return made
 
 
 def _check_call(what: str, path: str, method: Any, arguments: Sequence[str]) -> None:

@@ -258,6 +258,14 @@ def test_the_camera_s_frame_of_the_documents_can_be_made() -> None:
     np.testing.assert_allclose(made["frame"].depth, 0.45, rtol=1e-6)
 
 
+def test_the_evaluation_of_the_documents_gives_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    (block,) = re.findall(
+        r"```python\n([^`]*mpgrasp\.evaluate.*?)```", DOCUMENTS["docs/extending.md"], re.DOTALL
+    )
+    exec(block, {})
+    assert "mine      straight_down  1" in capsys.readouterr().out
+
+
 def test_the_controller_of_the_documents_grasps() -> None:
     result = run_episode(
         SceneConfig(objects=("usb_stick",), half_extent=0.03),

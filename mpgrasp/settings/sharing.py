@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from mpgrasp.brought import brought_object
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import from_table
 from mpgrasp.plugin_names import base_name
@@ -65,7 +66,11 @@ def controller_settings(
     changed = {} if preset is None else PRESETS[preset]
     if preset is not None and not set(changed) & set(names):
         raise ConfigError(f"--preset {preset} has no effect", got=", ".join(names), allowed=changed)
-    bases = {name: changed.get(name) or controller_defaults(name) for name in names if ":" not in name}
+    bases = {
+        name: changed.get(name) or controller_defaults(name)
+        for name in names
+        if ":" not in name and brought_object("controller", name) is None
+    }
     keys = {name: settings_read(name) for name in bases}
     return _share("controller", names, table, bases, keys)
 
@@ -80,7 +85,11 @@ def detector_settings(
     """
     from mpgrasp.detectors import detector_defaults
 
-    bases = {name: detector_defaults(base_name(name)) for name in names if ":" not in name}
+    bases = {
+        name: detector_defaults(base_name(name))
+        for name in names
+        if ":" not in name and brought_object("detector", name) is None
+    }
     keys = {name: tuple(field.name for field in fields(base)) for name, base in bases.items()}
     return _share("detector", names, table, bases, keys)
 
@@ -129,7 +138,9 @@ def _named(keys: Sequence[str]) -> Callable[[str], bool]:
 
 
 def _keywords(group: str, path: str) -> Callable[[str], bool]:
-    """Return what is true for a keyword that a plug-in can be called with as a setting."""
+    """Return what is true for a keyword that a plug-in can be called with as a setting; objects have none."""
+    if brought_object(group, path) is not None:
+        return lambda key: False
     plug_in = plug_in_class(group, path)
     try:
         parameters = inspect.signature(plug_in).parameters
