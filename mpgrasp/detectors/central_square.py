@@ -7,11 +7,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.grasp import GraspMap
 
+FALSE_MATCH = 0.2
+"""A group of pixels nearer than the image's median by more than this may be a false match of stereo [m];
+nothing that a Panda's hand takes in rises higher."""
+FALSE_SHARE = 0.01
+"""It is one if it covers no more than this share of the image."""
 MIN_SIDE = 32
 """Least side of an image that says anything [px]."""
 MIN_SEEN = 0.05
@@ -23,11 +30,35 @@ MIN_RELIEF = 1e-4
 def central_square(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -> DepthFrame:
     """Return the frame's central square of `crop` px, or as far as it goes, resized to `size` px.
 
-    A depth that is no distance, such as infinity or zero, is a hole like any other.
+    A depth that is no distance, such as infinity or zero, is a hole like any other, and so is a false match.
     """
     known = np.isfinite(frame.depth) & (frame.depth > 0)
     clean = frame if known.all() else replace(frame, depth=np.where(known, frame.depth, np.float32(np.nan)))
-    return crop_resize(clean, min(crop, *frame.depth.shape), size)
+    image = crop_resize(clean, min(crop, *frame.depth.shape), size)
+    false = false_matches(image.depth)
+    return image if false is None else replace(image, depth=np.where(false, np.float32(np.nan), image.depth))
+
+
+def false_matches(depth: NDArray[np.float32]) -> NDArray[np.bool_] | None:
+    """Return the pixels (H, W) of small groups far nearer than all else; None where there are none.
+
+    Stereo matches what it can where there is nothing to match with, in corners above all. With the holes
+    around it filled, such a speck looks like a tower to be grasped: networks claimed it with a quality of 1.
+
+    Args:
+        depth: (H, W) z-depth [m], NaN = no return.
+    """
+    some = depth[::4, ::4]
+    some = some[np.isfinite(some)]
+    if not some.size:
+        return None
+    near = depth < np.float32(np.median(some) - FALSE_MATCH)  # NaN is nowhere
+    if not near.any():
+        return None
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(near.astype(np.uint8), connectivity=8)
+    small = stats[:, cv2.CC_STAT_AREA] <= FALSE_SHARE * depth.size
+    small[0] = False  # everything else
+    return np.asarray(small[labels], bool) if small.any() else None
 
 
 def says_something(frame: DepthFrame, image: DepthFrame) -> bool:

@@ -35,11 +35,12 @@ def _run(command: Sequence[str]) -> int:
         scored, detectors = _as_they_are(options, reader)
     from mpgrasp.evaluate.written import results_table, summary_lines, write_results
 
+    if options.out is not None:  # first: nobody who stops reading what is printed loses a result
+        write_results(options, words, scored, detectors, reader.title)
     first, *others = summary_lines(scored, reader.title)
     print(first)
     _print(results_table(scored, options), others)
     if options.out is not None:
-        write_results(options, words, scored, detectors, reader.title)
         print(f"Results: {options.out}")
     return 0
 
@@ -50,7 +51,15 @@ def _as_they_are(options: argparse.Namespace, reader: Reader) -> tuple[Scored, d
 
     detectors, scored = make_detectors(options), Scored()
     folds = None if options.split is None else _folds(options, reader)
-    scored.add(reader, detectors, side=options.side, limit=options.limit, strict=options.strict, folds=folds)
+    scored.add(
+        reader,
+        detectors,
+        side=options.side,
+        limit=options.limit,
+        strict=options.strict,
+        levelled=options.level,
+        folds=folds,
+    )
     return scored, detectors
 
 
@@ -65,7 +74,14 @@ def _trained(
     folds = _folds(options, reader)
     chosen = Part(reader, list(folds))
     for _, part, detectors in trained_folds(options, chosen, folds, command):
-        scored.add(part, detectors, side=options.side, strict=options.strict, folds=folds)
+        scored.add(
+            part,
+            detectors,
+            side=options.side,
+            strict=options.strict,
+            levelled=options.level,
+            folds=folds,
+        )
         last = detectors
     return scored, last
 

@@ -76,7 +76,9 @@ def _shards(options: Namespace, reader: Reader, of_fold: Sequence[Sequence[str]]
         if not (folder / "meta.json").is_file():
             shutil.rmtree(folder, ignore_errors=True)
             images = usable(Part(reader, names), Skipped(), strict=options.strict)
-            squares = (square(image, options.side, NETWORK_SIZE).image for image in images)
+            squares = (
+                square(image, options.side, NETWORK_SIZE, levelled=options.level).image for image in images
+            )
             write_training_shards(squares, folder, f"{reader.title}, fold {k + 1} of {options.folds}")
         folders.append(folder)
     return folders

@@ -73,6 +73,9 @@ def make_parser() -> Parser:
         type=number(32, 4096, "px"),
         help="look at a square of that side around the labels; default: the largest square in the middle",
     )
+    add(
+        "--level", action="store_true", help="level the table first, for a camera that looks aslant (Cornell)"
+    )
     add("--depth", metavar="KIND", default="stereo", help="jacquard: stereo or perfect (default: stereo)")
     add("--focal", metavar="PX", type=number(1, 1e5, "px"), help="frames: focal length of the camera")
     add("--limit", metavar="N", type=COUNT, help="images to score (default: all)")

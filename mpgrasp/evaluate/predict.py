@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mpgrasp.datasets.labelled_image import LabelledImage, window
+from mpgrasp.datasets.levelling import level
 from mpgrasp.depth import CROP, CameraIntrinsics, DepthFrame
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.geometry import looking_down
@@ -42,7 +43,9 @@ class Square:
         return replace(grasp, u=u, v=v, width_px=grasp.width_px * scale, jaw_px=grasp.jaw_px * scale)
 
 
-def square(image: LabelledImage, side: float | None = None, size: int | None = None) -> Square:
+def square(
+    image: LabelledImage, side: float | None = None, size: int | None = None, *, levelled: bool = False
+) -> Square:
     """Return the square of an image that detectors see.
 
     Args:
@@ -50,6 +53,7 @@ def square(image: LabelledImage, side: float | None = None, size: int | None = N
         side: of the square around the labels, kept within the image [px]; None for the largest in the
             image's middle.
         size: of the result [px]; None for as many pixels as there are, up to `CROP`.
+        levelled: True if the table is levelled.
     """
     height, width = image.depth.shape
     whole = min(height, width)
@@ -61,7 +65,7 @@ def square(image: LabelledImage, side: float | None = None, size: int | None = N
         low, high = (side - 1) / 2, -(side + 1) / 2
         centre = (float(np.clip(u, low, width + high)), float(np.clip(v, low, height + high)))
     seen = window(image, centre, side, min(round(side), CROP) if size is None else size)
-    return Square(image=seen, centre=centre, side=float(side))
+    return Square(image=level(seen) if levelled else seen, centre=centre, side=float(side))
 
 
 def grasps(detector: GraspDetector, image: LabelledImage, count: int) -> list[GraspRectangle]:

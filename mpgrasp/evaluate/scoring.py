@@ -46,6 +46,7 @@ class Scored:
         side: float | None = None,
         limit: int | None = None,
         strict: bool = False,
+        levelled: bool = False,
         folds: Mapping[str, int] | None = None,
     ) -> None:
         """Score detectors on the images of a reader.
@@ -55,6 +56,7 @@ class Scored:
             detectors: by name.
             side: of the square around the labels [px]; None for the largest one in the middle.
             limit: number of images.
+            levelled: True if the table of every image is levelled.
             strict: True to end at the first image that is broken.
             folds: fold of each image, from 0.
 
@@ -62,7 +64,7 @@ class Scored:
             ConfigError: no image can be used; or with `strict` one cannot.
         """
         for image in usable(reader, self.skipped, limit=limit, strict=strict):
-            seen = square(image, side)
+            seen = square(image, side, levelled=levelled)
             rows = score(detectors, seen, None if folds is None else folds[image.name] + 1)
             self.rows += rows
             self.units.add(image.unit)
