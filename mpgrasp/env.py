@@ -1,6 +1,7 @@
 """The reach as a gymnasium environment: a policy steers the wrist camera, MP-PC's rule picks the grasp.
 
-Importing this module registers `mpgrasp/Grasp-v0`: `gymnasium.make("mpgrasp.env:mpgrasp/Grasp-v0")`.
+Where mpgrasp is installed gymnasium knows its environments: `gymnasium.make("mpgrasp/Thin-v0")` and those
+of other suites (`mpgrasp.env_ids`). Importing this module registers them as well.
 World, noise, arm and verdict are those of `mpgrasp.episode`: with MP-PC's own actions an episode ends as
 in the benchmark. Reference: https://gymnasium.farama.org/api/env/
 """
@@ -25,6 +26,7 @@ from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
 from mpgrasp.detectors.detector import GraspDetector
+from mpgrasp.env_ids import register
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import Episode
 from mpgrasp.episode.seeds import controller_seed
@@ -80,13 +82,18 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
             made at the first reset, so that it can run in the process that does that.
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
-        render_mode: None or "rgb_array", a view of the whole scene.
+        render_mode: None; "rgb_array", a view of the whole scene; or "depth_array", what the wrist camera saw
+            last, (224, 224) float32 [m], 0 where there was no return.
 
     Raises:
         ConfigError: a suite, name or setting that cannot be used.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.DISABLED}  # noqa: RUF012
+    metadata = {  # noqa: RUF012
+        "render_modes": ["rgb_array", "depth_array"],
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.DISABLED,
+    }
 
     def __init__(
         self,
@@ -181,13 +188,16 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         info["reflex"] = str(result.reflex or "")
         return observed, float(result.success), True, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture (312, 352, 3) of the scene as it is now, or None without a render mode."""
+    def render(self) -> NDArray[Any] | None:
+        """Return a picture (312, 352, 3) of the scene as it is now, or the last depth, as the mode says."""
         if self.render_mode is None:
             return None
         self._check_thread()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("there is nothing to see: call reset() first")
+        if self.render_mode == "depth_array":
+            assert self._episode.frame is not None
+            return _depth(self._episode.frame)[1]
         self._watcher = self._watcher or Watcher(self._episode.scene.model, self.config.camera_backend)
         return self._watcher.picture(self._episode.simulation.data)
 
@@ -263,15 +273,21 @@ def _mppc_config(suite: Suite) -> ReachConfig:
 
 
 def _observed(frame: DepthFrame, view: Observation) -> Observed:
-    image = crop_resize(frame, min(CROP, *frame.depth.shape))
+    image, depth = _depth(frame)
     T = view.T_world_tcp
     return {
-        "depth": np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32),
+        "depth": depth,
         "quality": _quality_on(image, view.grasp_map),
         "tcp": T[:3, 3].astype(np.float32),
         "yaw": np.array([np.arctan2(T[1, 0], T[0, 0])], np.float32),
         "time": np.array([view.time], np.float32),
     }
+
+
+def _depth(frame: DepthFrame) -> tuple[DepthFrame, NDArray[np.float32]]:
+    """Return the central square of a frame, and its depth as it is observed."""
+    image = crop_resize(frame, min(CROP, *frame.depth.shape))
+    return image, np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32)
 
 
 def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
@@ -284,4 +300,4 @@ def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
     return np.clip(quality, 0.0, 1.0).astype(np.float32)
 
 
-gymnasium.register(id="mpgrasp/Grasp-v0", entry_point="mpgrasp.env:GraspEnv")
+register()

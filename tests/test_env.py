@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
+import tomllib
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -24,6 +28,7 @@ from mpgrasp.detectors import make_detector
 from mpgrasp.detectors.config import OracleConfig
 from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.env import ACTION_SCALE, FIRST_TRAINING_EPISODE, GraspEnv
+from mpgrasp.env_ids import NAMESPACE, SUITES
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import run_episode
 from mpgrasp.exceptions import CameraError, ConfigError, SimulationError
@@ -31,6 +36,7 @@ from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
 from mpgrasp.suite import Suite, episode_seed, load_suite, parse_suite
 
+ROOT = Path(__file__).resolve().parent.parent
 STILL = np.zeros(4)
 DOWN = np.array([0.0, 0.0, -1.0, 0.0])
 
@@ -379,3 +385,35 @@ def test_several_run_side_by_side_and_none_resets_itself() -> None:
     assert info["mppc_action"].shape == (2, 4)
     assert GraspEnv.metadata["autoreset_mode"] is AutoresetMode.DISABLED
     vector.close()
+
+
+@pytest.mark.parametrize("name", [name for name, suite in SUITES.items() if suite])
+def test_an_environment_by_name_is_that_of_its_suite(name: str) -> None:
+    env = gymnasium.make(f"{NAMESPACE}/{name}")
+    assert isinstance(env.unwrapped, GraspEnv)
+    assert env.unwrapped.suite.name == SUITES[name]
+    env.close()
+
+
+def test_gymnasium_finds_the_environments_without_an_import_of_ours_and_loads_no_world() -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
+        "gymnasium.envs"
+    ]
+    assert declared == {NAMESPACE: "mpgrasp.env_ids:register"}
+    code = (
+        "import sys, gymnasium; from gymnasium.envs.registration import namespace\n"
+        f"with namespace({NAMESPACE!r}):\n    from mpgrasp.env_ids import register; register(); register()\n"
+        "print([e for e in gymnasium.registry if 'mpgrasp' in e], {'mujoco', 'torch'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    names = [f"{NAMESPACE}/{name}" for name in SUITES]
+    assert done.stdout.strip() == f"{names} set()", done.stderr
+
+
+def test_the_depth_that_is_rendered_is_the_depth_that_is_observed() -> None:
+    env = GraspEnv(detector=Painter(), render_mode="depth_array", config=EpisodeConfig(camera_backend="ray"))
+    observed, _ = env.reset(seed=0)
+    picture = env.render()
+    assert picture is not None
+    assert np.array_equal(picture, observed["depth"])
+    env.close()

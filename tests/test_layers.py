@@ -25,7 +25,7 @@ ORDER = (
     "scene.objects", "scene",
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
     "controllers", "guards", "motion", "recording", "episode",
-    "suite", "brought", "plugin_names", "plugins", "settings", "env", "inspection", "check",
+    "suite", "brought", "plugin_names", "plugins", "settings", "env_ids", "env", "inspection", "check",
     "training.data", "training", "datasets",
     "bench.ladders",
     "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",
