@@ -64,4 +64,5 @@ def test_no_detector_grasps_a_false_match(name: str) -> None:
         )
         found = detector.predict(frame)
         best.append(np.unravel_index(found.quality.argmax(), found.quality.shape))
-    assert np.hypot(*np.subtract(*best)) < 6
+    (row, col), (other_row, other_col) = best
+    assert np.hypot(row - other_row, col - other_col) < 6
