@@ -2,6 +2,7 @@
 # make test   sets everything up, then lint, types and tests
 # make venv   .venv with mpgrasp and its tools; done again only when pyproject.toml or constraints.txt change
 # make gl     headless OpenGL for the camera where it is missing (optional: the camera can ray-cast instead)
+# make docs   out/site, the documentation as pages
 # make wheel  dist/mpgrasp-*.whl with assets, scenes, benchmarks and weights inside
 # make format lets ruff reformat and mend what it can
 
@@ -11,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test venv gl wheel format clean
+.PHONY: demo test venv gl docs wheel format clean
 .DEFAULT_GOAL := demo
 
 venv: $(STAMP)
@@ -45,6 +46,11 @@ test: venv gl
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n $(JOBS)
+
+docs: venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]' -c constraints.txt
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo 'Read it: out/site/index.html'
 
 wheel: venv
 	$(BIN)/python -m build --wheel
