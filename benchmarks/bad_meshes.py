@@ -166,7 +166,7 @@ BAD_MESHES: dict[str, BadMesh] = {
     "ply-body-alone": _raw(_HEADER, ply_body(_BOX, "ascii 1.0"), ".ply"),
     "ply-types": _raw("unreadable PLY file.*decimal", ply(_BOX).replace(b"double", b"decimal"), ".ply"),
     # sizes
-    "millimetres": _stl("did you mean millimetres", _BOX.scaled(1000)),
+    "millimetres": _stl("is the file in millimetres", _BOX.scaled(1000)),
     "metres": _stl(_LARGE.format(1.5), _BOX.scaled(50)),
     "a-little-too-large": _stl(_LARGE.format(0.315), _BOX.scaled(10.5)),
     "astronomical": _stl(_LARGE.format("(2.9+.*|3.*)e.28"), _BOX.scaled(1e30)),

@@ -125,8 +125,8 @@ def make_parser() -> argparse.ArgumentParser:
         action="extend",
         default=[],
         help="single and unseen: meshes in metres in the place of the suite's objects, one per episode in "
-        "turn: OBJ, PLY and STL files, folders of them, or ycb for those scans of the YCB set that the hand "
-        "can close on however they lie (pip install mpgrasp[ycb])",
+        "turn: OBJ, PLY and STL files, folders of them or of folders with one object each, or ycb for those "
+        "scans of the YCB set that the hand can close on however they lie (pip install mpgrasp[ycb])",
     )
     add(
         "--density",
@@ -134,6 +134,13 @@ def make_parser() -> argparse.ArgumentParser:
         type=number(1, 25000, "kg/m^3"),
         default=500.0,
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
+    )
+    add(
+        "--scale",
+        metavar="M",
+        type=number(1e-6, 1e3, "m"),
+        default=1.0,
+        help="unit of the numbers in these files: 0.001 for millimetres (default: 1, metres)",
     )
     add_settings(parser)
     add(

@@ -89,7 +89,7 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> MeshVerdict
     """
     verdict = MeshVerdict(name=file.name, path=str(file.path), sha256=sha256(file.path))
     try:
-        body = read_body(file.path)
+        body = read_body(file.path, file.scale)
         model = body.as_object(file.name, density=density, provenance=f"mesh file {file.path.name}")
         qualities = _best_grasps(model, scene, _poses_key(body.key, scene, density))
     except (AssetError, ConfigError, SimulationError) as error:
@@ -104,7 +104,7 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> MeshVerdict
 def is_cached(file: ObjectFile, scene: SceneConfig, density: float) -> bool:
     """True if `examine` has its answer at hand."""
     try:
-        key = mesh_key(file.path)
+        key = mesh_key(file.path, file.scale)
     except AssetError:
         return True
     mesh = load_result("meshes", key, CachedBody)

@@ -16,6 +16,8 @@ from pathlib import Path
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.names import MAX_NAME, printable, safe_name
 
+LAYOUTS = ("textured.obj", "meshes/model.obj", "models/model_normalized.obj")
+"""Mesh of an object that has a folder of its own, as in OCRTOC, Google's scanned objects and ShapeNet."""
 YCB = "ycb"
 """Stands for all scans of the package; a folder of that name is `./ycb`."""
 
@@ -28,13 +30,17 @@ class ObjectFile:
     path: Path
     strict: bool = False
     """True if the hand must be able to close on it however it comes to rest, not just in some pose."""
+    scale: float = 1.0
+    """Unit of its numbers [m]."""
 
 
-def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
+def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, ...]:
     """The mesh files that the words of `--objects` stand for, each once, under different names.
 
     Args:
-        words: files, folders (all their OBJ, PLY and STL files, by name) or `ycb`.
+        words: files, folders (all their OBJ, PLY and STL files, by name, and the one object of each folder in
+            them that has one of the `LAYOUTS`) or `ycb`.
+        scale: unit of the numbers in the files [m]; the scans are in metres.
 
     Raises:
         ConfigError: a file or folder that is not there or holds no mesh, or scans that are not installed.
@@ -57,9 +63,9 @@ def find_objects(words: Sequence[str]) -> tuple[ObjectFile, ...]:
             ) from None
         paths = _meshes_in(path) if stat.S_ISDIR(kind) else [path]
         found.update((path, False) for path in paths if path not in found)
-    names = _different(safe_name(path.stem) for path in found)
+    names = _different(safe_name(_name(path)) for path in found)
     return tuple(
-        ObjectFile(name=name, path=path, strict=strict)
+        ObjectFile(name=name, path=path, strict=strict, scale=1.0 if strict else scale)
         for name, (path, strict) in zip(names, found.items(), strict=True)
     )
 
@@ -73,16 +79,34 @@ def _meshes_in(folder: Path) -> list[Path]:
     from mpgrasp.scene.objects.surface import MESH_TYPES  # loads MuJoCo, which a help text can do without
 
     try:
-        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_TYPES)
+        inside = sorted(folder.iterdir())
+        paths = [path for path in inside if path.suffix.lower() in MESH_TYPES]
+        paths += [path for item in inside if item.is_dir() and (path := _one_object(item)) is not None]
     except OSError as error:
         raise ConfigError(
             "unreadable folder of objects", got=str(folder), allowed=f"a readable one ({error.strerror})"
         ) from None
     if not paths:
         raise ConfigError(
-            "no mesh in folder", got=str(folder), allowed=f"files that end in {', '.join(MESH_TYPES)}"
+            "no mesh in folder",
+            got=str(folder),
+            allowed=f"files that end in {', '.join(MESH_TYPES)}, or folders with {', '.join(LAYOUTS)}",
         )
     return paths
+
+
+def _one_object(folder: Path) -> Path | None:
+    """The mesh of a folder that holds one object, if it has one of the usual layouts."""
+    return next((path for layout in LAYOUTS if (path := folder / layout).is_file()), None)
+
+
+def _name(path: Path) -> str:
+    """Name of a mesh: of its file, or of its folder where the file has a name that all have."""
+    for layout in LAYOUTS:
+        depth = layout.count("/") + 1
+        if path.as_posix().endswith(f"/{layout}"):
+            return path.parents[depth - 1].name
+    return path.stem
 
 
 def _ycb_folder() -> Path:

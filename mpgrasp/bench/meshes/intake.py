@@ -38,7 +38,13 @@ _context = multiprocessing.get_context("spawn")
 
 
 def take_objects(
-    suite: Suite, words: Sequence[str], *, density: float, workers: int, quiet: bool = False
+    suite: Suite,
+    words: Sequence[str],
+    *,
+    density: float,
+    workers: int,
+    scale: float = 1.0,
+    quiet: bool = False,
 ) -> tuple[Suite, tuple[MeshVerdict, ...]]:
     """The suite with meshes in the place of its objects, one per turn, and the verdict on every mesh.
 
@@ -47,6 +53,7 @@ def take_objects(
         words: files, folders and `ycb`.
         density: [kg/m^3]
         workers: number of processes; 0 works in this one.
+        scale: unit of the numbers in the files [m].
         quiet: no progress.
 
     Raises:
@@ -54,7 +61,7 @@ def take_objects(
     """
     check_density(density)
     scene = _shared_scene(suite)
-    files = find_objects(words)
+    files = find_objects(words, scale)
     require_packages()
     verdicts = _examine_all(files, scene, density, workers, quiet)
     models = [verdict.model for verdict in verdicts if verdict.model is not None]

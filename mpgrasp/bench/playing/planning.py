@@ -185,6 +185,7 @@ def _with_objects(
         suites[0],
         arguments.objects,
         density=arguments.density,
+        scale=arguments.scale,
         workers=arguments.workers,
         quiet=arguments.quiet,
     )

@@ -124,8 +124,8 @@ def require_packages() -> None:
         )
 
 
-def mesh_key(path: Path) -> str:
-    """Hash of a mesh file's content, of how it is treated, and of the packages that do it.
+def mesh_key(path: Path, scale: float = 1.0) -> str:
+    """Hash of a mesh file's content, of its unit [m], of how it is treated, and of the packages that do it.
 
     Raises:
         AssetError: unreadable file.
@@ -136,26 +136,31 @@ def mesh_key(path: Path) -> str:
         "coacd": _COACD,
         "tolerances": [MIN_SIZE, MAX_SIZE, MAX_PATCH, NEGLIGIBLE, TOLERANCE, MAX_FACES, MAX_VERTICES],
         "packages": {name: metadata.version(name) for name in _PACKAGES},
+        **({} if scale == 1 else {"scale": scale}),
     }
     digest = hashlib.sha256(json.dumps(treatment, sort_keys=True).encode())
     digest.update(_content(path))
     return digest.hexdigest()
 
 
-def read_body(path: Path) -> MeshBody:
-    """The convex pieces of a mesh file in metres (OBJ, PLY or STL); takes seconds unless it is cached.
+def read_body(path: Path, scale: float = 1.0) -> MeshBody:
+    """The convex pieces of a mesh file (OBJ, PLY or STL); takes seconds unless it is cached.
+
+    Args:
+        path: of the file.
+        scale: unit of its numbers [m]: 0.001 for millimetres.
 
     Raises:
         AssetError: a mesh that is unreadable, empty, of an implausible size, or not closed and not to be
             closed. The message does not name the file.
     """
     require_packages()
-    key = mesh_key(path)
+    key = mesh_key(path, scale)
     result = load_result("meshes", key, CachedBody)
     if result is None:
         try:
             with np.errstate(divide="ignore", invalid="ignore"):  # flat surfaces have no centre of mass
-                pieces, volume = _make_body(load_surface(_content(path), path.suffix.lower()))
+                pieces, volume = _make_body(load_surface(_content(path), path.suffix.lower(), scale))
             result = CachedBody(pieces=[piece.tolist() for piece in pieces], volume=volume)
         except AssetError as error:
             result = CachedBody(refused=str(error))

@@ -22,12 +22,13 @@ NEGLIGIBLE = 1e-3
 """A loose piece with less than this share of the mesh's surface, and next to no faces, is a flaw."""
 
 
-def load_surface(content: bytes, suffix: str) -> Any:
+def load_surface(content: bytes, suffix: str, scale: float = 1.0) -> Any:
     """The whole surface of a file in metres as one `trimesh.Trimesh`.
 
     Args:
         content: of the file.
         suffix: its type, as in `MESH_TYPES`.
+        scale: unit of the file [m].
 
     Raises:
         AssetError: unreadable, empty or of an implausible size.
@@ -53,12 +54,13 @@ def load_surface(content: bytes, suffix: str) -> Any:
     n = len(loaded.vertices)
     if loaded.faces.min() < (-n if suffix == ".obj" else 0) or loaded.faces.max() >= n:  # OBJ counts back too
         raise AssetError("mesh has faces between vertices that it does not have")
-    corners = np.asarray(loaded.vertices, float)[loaded.faces].reshape(-1, 3)
+    vertices = loaded.vertices if scale == 1 else np.asarray(loaded.vertices, float) * scale
+    corners = np.asarray(vertices, float)[loaded.faces].reshape(-1, 3)
     if not np.isfinite(corners).all():
         raise AssetError("mesh has vertices that are not numbers")
     _check_size(float(np.ptp(corners, axis=0).max()))
     # a new mesh without texture: where colour or normals change, files have each vertex twice
-    mesh = trimesh.Trimesh(loaded.vertices, loaded.faces, process=True)
+    mesh = trimesh.Trimesh(vertices, loaded.faces, process=True)
     a, b, c = mesh.faces.T
     mesh.update_faces((a != b) & (b != c) & (c != a))
     if len(mesh.faces) == 0:
@@ -122,7 +124,9 @@ def _check_size(edge: float) -> None:
     allowed = f"a longest edge of {MIN_SIZE} to {MAX_SIZE} m"
     if edge >= 1:
         raise AssetError(
-            "mesh is too large [m]", got=round(edge, 3), allowed=f"{allowed}; did you mean millimetres?"
+            "mesh is too large [m]",
+            got=round(edge, 3),
+            allowed=f"{allowed}; is the file in millimetres? --scale 0.001",
         )
     if edge > MAX_SIZE:
         raise AssetError("mesh is too large [m]", got=round(edge, 3), allowed=allowed)

@@ -57,6 +57,32 @@ def test_objects_are_named_after_their_files_and_told_apart(tmp_path: Path) -> N
     assert [file.name for file in find_objects(words)] == ["box", "crate", "box_2"]
 
 
+def test_an_object_in_a_folder_of_its_own_has_the_name_of_the_folder(tmp_path: Path) -> None:
+    for path in (
+        "mug/textured.obj",
+        "bowl/meshes/model.obj",
+        "car/models/model_normalized.obj",
+        "x/other.obj",
+    ):
+        box(tmp_path / "set" / path)
+    box(tmp_path / "set" / "alone.stl")
+    assert [file.name for file in find_objects([str(tmp_path / "set")])] == ["alone", "bowl", "car", "mug"]
+    assert [file.name for file in find_objects([str(tmp_path / "set" / "mug" / "textured.obj")])] == ["mug"]
+
+
+def test_a_mesh_in_millimetres_is_the_same_object_with_its_scale(tmp_path: Path) -> None:
+    small, large = box(tmp_path / "m.stl", (0.04, 0.05, 0.06)), box(tmp_path / "mm.stl", (40, 50, 60))
+    scene = load_suite("unseen").scenes[0]
+    found = []
+    for path, scale in ((small, 1.0), (large, 0.001)):
+        (file,) = find_objects([str(path)], scale)
+        verdict = examine(file, scene, DENSITY)
+        assert verdict.model is not None, verdict.reason
+        found.append(verdict.model)
+    assert found[1].mass == pytest.approx(found[0].mass, rel=1e-6)
+    assert found[1].size == pytest.approx(found[0].size, rel=1e-6)
+
+
 def test_run_plays_what_is_usable_and_reports_the_rest(
     fake_world: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -75,7 +101,7 @@ def test_run_plays_what_is_usable_and_reports_the_rest(
     reasons = {item["name"]: item.get("reason") for item in run["objects"]}
     assert reasons["crate"] is reasons["post"] is None
     for name, reason in (
-        ("cube", "the hand cannot close on it"), ("in_mm", "did you mean millimetres"),
+        ("cube", "the hand cannot close on it"), ("in_mm", "is the file in millimetres"),
         ("open", "not closed"), ("void", "empty"),
     ):  # fmt: skip
         assert reason in reasons[name]

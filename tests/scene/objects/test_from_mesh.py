@@ -51,7 +51,7 @@ def test_u_shape_keeps_its_cavity(tmp_path: Path) -> None:
     ("make", "reason"),
     [
         (open_box, "not closed"),
-        (lambda: trimesh.creation.box((40, 50, 60)), "did you mean millimetres"),
+        (lambda: trimesh.creation.box((40, 50, 60)), "is the file in millimetres"),
         (lambda: trimesh.creation.box((0.35, 0.05, 0.05)), "too large"),
         (lambda: trimesh.creation.box((0.002, 0.002, 0.002)), "too small"),
         (half_ball, "not closed"),
