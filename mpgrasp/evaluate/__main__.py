@@ -47,12 +47,13 @@ def _run(command: Sequence[str]) -> int:
 
 def _as_they_are(options: argparse.Namespace, reader: Reader) -> tuple[Scored, dict[str, GraspDetector]]:
     """Score detectors with the weights that they have."""
+    from mpgrasp.evaluate.cross_validation import Part
     from mpgrasp.evaluate.scoring import Scored
 
     detectors, scored = make_detectors(options), Scored()
     folds = None if options.split is None else _folds(options, reader)
     scored.add(
-        reader,
+        reader if folds is None else Part(reader, list(folds)),
         detectors,
         side=options.side,
         limit=options.limit,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shutil
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,17 +71,30 @@ def trained_folds(
 
 
 def _shards(options: Namespace, reader: Reader, of_fold: Sequence[Sequence[str]]) -> list[Path]:
-    """Return a folder of training shards for each fold; those that are whole are kept."""
+    """Return a folder of training shards for each fold; those that are whole are kept.
+
+    Raises:
+        ConfigError: shards that were made of other images, or in another way.
+    """
     folders = []
     for k, names in enumerate(of_fold):
         folder = options.out / "shards" / f"{options.split}-{k + 1}-of-{options.folds}"
-        if not (folder / "meta.json").is_file():
+        digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:12]
+        source = f"{reader.title}, fold {k + 1} of {options.folds}, {len(names)} images ({digest})"
+        source += f", side {options.side or 'whole'}" + (", levelled" if options.level else "")
+        there = folder / "meta.json"
+        if there.is_file():
+            told = json.loads(there.read_text(encoding="utf-8")).get("source")
+            if told != source:
+                raise ConfigError(f"{folder} holds other training images", got=told, allowed=source)
+        else:
             shutil.rmtree(folder, ignore_errors=True)
             images = usable(Part(reader, names), Skipped(), strict=options.strict)
+            labelled = (image for image in images if image.rectangles)
             squares = (
-                square(image, options.side, NETWORK_SIZE, levelled=options.level).image for image in images
+                square(image, options.side, NETWORK_SIZE, levelled=options.level).image for image in labelled
             )
-            write_training_shards(squares, folder, f"{reader.title}, fold {k + 1} of {options.folds}")
+            write_training_shards(squares, folder, source)
         folders.append(folder)
     return folders
 

@@ -136,6 +136,25 @@ def test_folds_are_told_and_are_the_same_for_every_detector(
     assert len({(reader.object_of(name), fold) for name, fold in folds.items()}) == 3
 
 
+def test_folds_are_of_the_first_images_and_a_broken_one_is_not_made_up_for(tmp_path: Path) -> None:
+    folder, out = write_cornell(tmp_path / "c", 6), tmp_path / "out"
+    (folder / "01" / "pcd0101cpos.txt").unlink()
+    words = [
+        "cornell",
+        str(folder),
+        "--split",
+        "iw",
+        "--folds",
+        "2",
+        "--limit",
+        "4",
+        "--detector",
+        "heuristic",
+    ]
+    assert main([*words, "--out", str(out)]) == 0
+    assert sorted(json.loads((out / "folds.json").read_text())) == ["0100", "0102", "0103"]
+
+
 def test_a_fold_is_tested_by_what_was_trained_on_the_others_and_a_second_command_trains_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -167,6 +186,8 @@ def test_a_fold_is_tested_by_what_was_trained_on_the_others_and_a_second_command
     before = weights.stat().st_mtime_ns
     assert main(words) == 0
     assert weights.stat().st_mtime_ns == before
+    assert main([*words, "--level"]) == 2
+    assert "holds other training images" in capsys.readouterr().err
 
 
 def row(detector: str, image: int, top1: bool, top5: bool = True) -> ImageScore:
