@@ -108,6 +108,8 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("bench race oracle/mppc oracle/mppc --suite thin", "a race of a method with itself"),
     ("bench race oracle/mppc oracle/mvp --suite thin --alpha 2", "unusable number; got '2'"),
     ("bench thin --runtime shared --engine ray", "--runtime shared with --engine ray"),
+    ("bench leaderboard", f"{_REQUIRED}DIR"),
+    ("bench leaderboard absent", "no run there"),
     ("evaluate", f"{_REQUIRED}dataset"),
     ("evaluate imagenet .", "invalid choice: 'imagenet'"),
     ("evaluate cornell absent", "no such folder; got 'absent'"),

@@ -34,6 +34,7 @@ examples:
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
+  python -m mpgrasp.bench leaderboard RUN RUN         (see leaderboard --help)
   python -m mpgrasp.bench settings thin              (see settings --help)
   python -m mpgrasp.bench sweep thin --set ...       (see sweep --help)
 
