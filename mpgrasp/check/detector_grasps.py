@@ -15,7 +15,7 @@ ANGLE = np.deg2rad(30)
 OPENINGS = (0.8, 3.5)
 """Opening over the breadth of the bar. With less, a finger comes down on it, a network's error left aside;
 this hand, fully open, has 2.7."""
-AMPLE = 2.2
+AMPLE = 2.4
 """Opening over the breadth of the bar beyond which it is worth a look; those that ship ask for less."""
 SPREAD = 1.6
 """Most that the openings of one bar, each the median under `YAWS`, may differ by between heights, as a ratio.

@@ -99,7 +99,8 @@ def _print(table: Sequence[Sequence[str]], lines: Sequence[str]) -> None:
     from rich.table import Table
 
     (first, *headings), *body = table
-    grid = Table(first)
+    grid = Table()
+    grid.add_column(first, overflow="fold")
     for heading in headings:
         grid.add_column(heading, justify="right")
     for row in body:
