@@ -27,6 +27,7 @@ import subprocess
 import time
 import weakref
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -184,6 +185,10 @@ class OtherProcess:
                     raise self._broken("no answer in time")
                 piece = os.read(pipe, min(missing, _PIECE))
                 if not piece:
+                    with suppress(
+                        subprocess.TimeoutExpired
+                    ):  # it has let go of the pipe, and is about to end
+                        self._process.wait(1.0)
                     raise self._broken(f"it has ended with code {self._process.poll()}")
                 pieces.append(piece)
                 missing -= len(piece)

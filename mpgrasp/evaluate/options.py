@@ -195,7 +195,7 @@ def make_detectors(options: argparse.Namespace) -> dict[str, GraspDetector]:
     Raises:
         ConfigError, WeightsError: one of them cannot be used.
     """
-    from mpgrasp.detectors.detector import reads_truth
+    from mpgrasp.detectors.detector import reads_colour, reads_truth
     from mpgrasp.plugins import load_detector, parse_weights
 
     names, own = detector_list(options)
@@ -204,9 +204,7 @@ def make_detectors(options: argparse.Namespace) -> dict[str, GraspDetector]:
     for name, detector in made.items():
         if reads_truth(detector):
             raise ConfigError("a dataset has no true shape to tell", got=name, allowed="other detectors")
-        found: Any = getattr(getattr(detector, "weights", None), "input", None)
-        if options.channels is not None and found is not None and found.modality != options.channels:
-            raise ConfigError(
-                f"weights of {name} for other channels", got=found.modality, allowed=options.channels
-            )
+        if options.channels is not None and reads_colour(detector) != (options.channels != "d"):
+            reads = "colour" if reads_colour(detector) else "depth alone"
+            raise ConfigError(f"{name} reads {reads}", got=f"--channels {options.channels}")
     return made

@@ -220,7 +220,7 @@ def test_rates_and_tests_are_those_of_the_rows() -> None:
         (["--split", "ow", "--folds", "4"], "unusable number of folds of 1 objects"),
         (["--settings", "[1]"], "--settings is no JSON object"),
         (["--settings", '{"width": 8}'], "--settings without --train"),
-        (["--channels", "rgb"], "weights of dhrnet for other channels; got 'd'"),
+        (["--channels", "rgb"], "dhrnet reads depth alone; got '--channels rgb'"),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused_in_a_line(

@@ -17,13 +17,14 @@ import pytest
 from mpgrasp.bench.analysis.summary import paired_tests, summarise
 from mpgrasp.bench.record import Cell, played
 from mpgrasp.bench.results.reader import read_lines, read_summary
+from mpgrasp.detectors.networks.description import read_card
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "benchmarks" / "results"
-SHIPPED = {
-    path.stem: hashlib.sha256(path.read_bytes()).hexdigest()
-    for path in (ROOT / "assets" / "weights").glob("*.safetensors")
-}
+WEIGHTS = ROOT / "assets" / "weights"
+SHIPPED = {path.stem: hashlib.sha256(path.read_bytes()).hexdigest() for path in WEIGHTS.glob("*.safetensors")}
+EARLIER = {name: read_card(WEIGHTS / f"{name}.safetensors")["card"]["start"]["sha256"] for name in SHIPPED}
+"""Weights of the first stage of training, that those which ship went on from: results of theirs are stale."""
 RUNS = sorted(RESULTS.rglob("run.json"))
 EPISODES = {"run.json", "episodes.jsonl", "summary.json", "report.md"}
 """Files of a run of the benchmark."""
@@ -69,7 +70,7 @@ def tracked(pattern: str) -> list[Path]:
 
 def wanted_files(folder: Path) -> set[str]:
     """Names of the files that a published folder consists of."""
-    if folder.name == "training":
+    if folder.name in ("training", "first-stage"):
         return {f"{network}.{kind}" for network in SHIPPED for kind in ("csv", "png")}
     if folder.name == "paper":  # the report on several runs
         return {"report.md"}
@@ -79,9 +80,18 @@ def wanted_files(folder: Path) -> set[str]:
 
 
 @EVERY_RUN
-def test_a_published_result_is_one_of_the_shipped_weights(path: Path) -> None:
-    for name, digest in digests(json.loads(path.read_text(encoding="utf-8"))):
-        assert digest == SHIPPED[name], f"{path.parent.name} was made with other weights of {name}"
+def test_a_published_result_is_one_of_the_shipped_weights_or_is_said_to_be_stale(path: Path) -> None:
+    told = list(digests(json.loads(path.read_text(encoding="utf-8"))))
+    for name, digest in told:
+        assert digest in (SHIPPED[name], EARLIER[name]), f"{path.parent.name}: other weights of {name}"
+    stale = {digest == EARLIER[name] for name, digest in told}
+    assert len(stale) < 2, "weights of one stage"
+    sections = (ROOT / "docs" / "results.md").read_text(encoding="utf-8").split("\n## ")
+    own = [section for section in sections if f"`benchmarks/results/{folder_of(path)}`" in section]
+    if True in stale:
+        assert any("**The networks were trained further since**" in section for section in sections)
+    elif told:
+        assert any("second stage" in section for section in own), "a section says which weights it is of"
 
 
 def test_most_published_results_tell_their_weights() -> None:
