@@ -82,18 +82,16 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
             made at the first reset, so that it can run in the process that does that.
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
-        render_mode: None; "rgb_array", a view of the whole scene; or "depth_array", what the wrist camera saw
-            last, (224, 224) float32 [m], 0 where there was no return.
+        render_mode: None, "rgb_array" (a view of the whole scene) or "depth_array" (`depth` as observed last).
 
     Raises:
         ConfigError: a suite, name or setting that cannot be used.
     """
 
     metadata = {  # noqa: RUF012
-        "render_modes": ["rgb_array", "depth_array"],
-        "render_fps": 10,
+        "render_modes": ["rgb_array", "depth_array"], "render_fps": 10,
         "autoreset_mode": AutoresetMode.DISABLED,
-    }
+    }  # fmt: skip
 
     def __init__(
         self,
@@ -196,8 +194,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("there is nothing to see: call reset() first")
         if self.render_mode == "depth_array":
-            assert self._episode.frame is not None
-            return _depth(self._episode.frame)[1]
+            return None if self._episode.frame is None else _depth(self._episode.frame)[1]
         self._watcher = self._watcher or Watcher(self._episode.scene.model, self.config.camera_backend)
         return self._watcher.picture(self._episode.simulation.data)
 

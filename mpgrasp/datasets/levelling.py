@@ -53,7 +53,6 @@ def table_depth(depth: NDArray[np.float32]) -> NDArray[np.float32] | None:
     kept = np.ones(len(y), bool)
     for _ in range(ROUNDS):
         weights = np.linalg.lstsq(x[kept], y[kept], rcond=None)[0]
-        # what is nearer than the table is an object, and counts at once; noise is on both sides
         off = np.abs(x @ weights - y)
         bound = KEPT * max(float(np.median(off)), 1e-4)
         kept = off <= bound

@@ -30,8 +30,3 @@ TABLE_II = (
     PaperRow("DHRNet", "rgbd", 99.17, 97.3),
 )
 """Rows of the methods that are here; the paper has nine more."""
-
-
-def paper_rows(channels: str) -> list[PaperRow]:
-    """Return the rows for a modality."""
-    return [row for row in TABLE_II if row.channels == channels]

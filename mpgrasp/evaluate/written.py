@@ -11,7 +11,7 @@ from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from mpgrasp.bench.report.names import name_of_controller as name_of
 from mpgrasp.bench.results.provenance import provenance
@@ -162,5 +162,5 @@ def _page(title: str, command: str, table: Rows, lines: Sequence[str], pictures:
         heading=Markup("").join(Markup("<th>{}</th>").format(cell) for cell in heading),
         body=Markup("").join(Markup("<tr>{}</tr>").format(row) for row in cells),
         figures=figures,
-        command=escape(command),
+        command=command,
     )
