@@ -82,7 +82,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
             made at the first reset, so that it can run in the process that does that.
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
-        render_mode: None, "rgb_array" (a view of the whole scene) or "depth_array" (`depth` as observed last).
+        render_mode: None, "rgb_array" (a view of the whole scene) or "depth_array" (`depth` as seen last).
 
     Raises:
         ConfigError: a suite, name or setting that cannot be used.
