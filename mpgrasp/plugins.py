@@ -91,6 +91,8 @@ def load_detector(
     """
     theirs: GraspDetector | None = brought_object("detector", name)
     if theirs is not None:
+        if weights is not None:
+            raise ConfigError("an object has weights of its own", got=f"{name}={weights}", allowed="none")
         _check_calls("detector", name, theirs, _DETECTOR_CALLS)
         return theirs
     if weights is None:

@@ -14,7 +14,7 @@ from mpgrasp.api.players import Players
 from mpgrasp.api.results import Results
 from mpgrasp.brought import brought
 from mpgrasp.command_line import EXIT_BAD_INPUT, EXIT_INTERRUPTED
-from mpgrasp.exceptions import OutputError
+from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.plugins import controller_names, detector_names
 
 
@@ -46,8 +46,8 @@ def evaluate(
         settings: settings by name, such as `{"controller.gamma": 4 / 3, "sensor.subpixel": 0.12}`.
         seed: of the run.
         weights: weights files by name of the detector.
-        workers: processes; None for one per core, or this one alone where objects play, since they cannot
-            be sent to another.
+        workers: processes beside this one; None for one per core, or 0, this one alone, where objects
+            play: they cannot be sent to another.
         record: episodes of each combination that are recorded, the first ones.
         camera: "auto", "gl" or "ray".
         noise: True if the depth camera is as noisy as a real one.
@@ -72,8 +72,8 @@ def evaluate(
     if workers is None:
         workers = 0 if objects else len(os.sched_getaffinity(0))
     elif objects and workers:
-        # they stay where they are: a copy in another process would not be what the caller holds
-        workers = 0
+        # a copy in another process would not be what the caller holds
+        raise ConfigError("objects play in this process alone", got=f"workers={workers}", allowed="0 or None")
     kept = tempfile.TemporaryDirectory(prefix="mpgrasp-") if out is None else None
     folder = Path(kept.name, "run") if kept is not None else Path(str(out))
     words = [suite, "--detector", ",".join(detectors.names), "--controller", ",".join(controllers.names)]

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
-
 from mpgrasp.api.evaluation import assignments
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.recording.false_colour import Picture
@@ -42,9 +40,9 @@ class SceneView:
             watcher.close()
 
     def _repr_png_(self) -> bytes:
-        ok, data = cv2.imencode(".png", self.picture()[..., ::-1])
-        assert ok
-        return bytes(data.tobytes())
+        from mpgrasp.evaluate.sheets import png
+
+        return png(self.picture())
 
     def __repr__(self) -> str:
         return f"scene of {self.suite}, seed {self.seed}: {', '.join(self.scene.objects)}"

@@ -38,6 +38,30 @@ class Reader(Protocol):
         ...
 
 
+class Subset:
+    """Some images of a dataset, as a dataset: of a fold, or of all folds.
+
+    Args:
+        whole: the dataset.
+        names: of the images, in the order in which they are read.
+    """
+
+    def __init__(self, whole: Reader, names: Sequence[str]) -> None:
+        self.title, self.names, self._whole = whole.title, names, whole
+
+    def object_of(self, name: str) -> str:
+        """Return what is on an image."""
+        return self._whole.object_of(name)
+
+    def read(self, name: str) -> LabelledImage:
+        """Return an image.
+
+        Raises:
+            BrokenImageError: it cannot be used.
+        """
+        return self._whole.read(name)
+
+
 @dataclass
 class Skipped:
     """Images that were left out, and why."""

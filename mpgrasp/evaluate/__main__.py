@@ -47,13 +47,13 @@ def _run(command: Sequence[str]) -> int:
 
 def _as_they_are(options: argparse.Namespace, reader: Reader) -> tuple[Scored, dict[str, GraspDetector]]:
     """Score detectors with the weights that they have."""
-    from mpgrasp.evaluate.cross_validation import Part
+    from mpgrasp.datasets.reader import Subset
     from mpgrasp.evaluate.scoring import Scored
 
     detectors, scored = make_detectors(options), Scored()
     folds = None if options.split is None else _folds(options, reader)
     scored.add(
-        reader if folds is None else Part(reader, list(folds)),
+        reader if folds is None else Subset(reader, list(folds)),
         detectors,
         side=options.side,
         limit=options.limit,
@@ -68,12 +68,13 @@ def _trained(
     options: argparse.Namespace, reader: Reader, command: str
 ) -> tuple[Scored, dict[str, GraspDetector]]:
     """Score networks on folds that they were not trained on; those of the last fold are told."""
-    from mpgrasp.evaluate.cross_validation import Part, trained_folds
+    from mpgrasp.datasets.reader import Subset
+    from mpgrasp.evaluate.cross_validation import trained_folds
     from mpgrasp.evaluate.scoring import Scored
 
     scored, last = Scored(), dict[str, "GraspDetector"]()
     folds = _folds(options, reader)
-    chosen = Part(reader, list(folds))
+    chosen = Subset(reader, list(folds))
     for _, part, detectors in trained_folds(options, chosen, folds, command):
         scored.add(
             part,

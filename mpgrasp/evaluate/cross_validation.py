@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpgrasp.datasets.folds import members
-from mpgrasp.datasets.labelled_image import LabelledImage
-from mpgrasp.datasets.reader import Reader, Skipped, usable
+from mpgrasp.datasets.reader import Reader, Skipped, Subset, usable
 from mpgrasp.datasets.training_shards import write_training_shards
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.detector import GraspDetector
@@ -28,22 +27,9 @@ VALIDATE_EVERY = 0.1
 """Share of the budget between validations; the best weights by them are kept."""
 
 
-class Part:
-    """Some images of a dataset, as a dataset."""
-
-    def __init__(self, whole: Reader, names: Sequence[str]) -> None:
-        self.title, self.names, self._whole = whole.title, names, whole
-
-    def object_of(self, name: str) -> str:
-        return self._whole.object_of(name)
-
-    def read(self, name: str) -> LabelledImage:
-        return self._whole.read(name)
-
-
 def trained_folds(
     options: Namespace, reader: Reader, folds: Mapping[str, int], command: str
-) -> Iterator[tuple[int, Part, dict[str, GraspDetector]]]:
+) -> Iterator[tuple[int, Subset, dict[str, GraspDetector]]]:
     """Train every network on all folds but one, and yield that fold, from 0, with the trained detectors.
 
     Shards, weights and checkpoints are kept in `--out`; what is there already is not made again.
@@ -67,7 +53,7 @@ def trained_folds(
             weights = options.out / "folds" / f"{stem}.safetensors"
             _train(options, name, data, which, weights, command)
             made[name] = NetworkDetector.load(name, weights, runtime=options.runtime)
-        yield which, Part(reader, of_fold[which]), made
+        yield which, Subset(reader, of_fold[which]), made
 
 
 def _shards(options: Namespace, reader: Reader, of_fold: Sequence[Sequence[str]]) -> list[Path]:
@@ -89,7 +75,7 @@ def _shards(options: Namespace, reader: Reader, of_fold: Sequence[Sequence[str]]
                 raise ConfigError(f"{folder} holds other training images", got=told, allowed=source)
         else:
             shutil.rmtree(folder, ignore_errors=True)
-            images = usable(Part(reader, names), Skipped(), strict=options.strict)
+            images = usable(Subset(reader, names), Skipped(), strict=options.strict)
             labelled = (image for image in images if image.rectangles)
             squares = (
                 square(image, options.side, NETWORK_SIZE, levelled=options.level).image for image in labelled

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 DATASETS = ("cornell", "jacquard", "multi", "synthetic", "frames")
 CHANNELS = ("d", "rgb", "rgbd")
+_OF_TRAINING = ("epochs", "batch", "lr", "precision", "settings", "seed", "threads", "fold")
+"""Options that have an effect with --train alone."""
 _EPILOG = """\
 datasets:
   cornell    the Cornell grasping dataset
@@ -138,10 +140,21 @@ def check(options: argparse.Namespace) -> None:
         raise ConfigError(f"--train without {missing}", allowed="--train --split iw|ow --out DIR")
     if options.train and options.weights:
         raise ConfigError("--weights with --train", got=options.weights[0], allowed="one of both")
-    if network_settings(options) and not options.train:
-        raise ConfigError("--settings without --train", got=options.settings, allowed="both or none")
-    if options.fold is not None and not (options.train and options.fold <= options.folds):
-        raise ConfigError("unusable --fold", got=options.fold, allowed="with --train, 1 to --folds")
+    network_settings(options)
+    if options.fold is not None and options.fold > options.folds:
+        raise ConfigError("unusable --fold", got=options.fold, allowed="1 to --folds")
+    without_effect = {
+        "--train": () if options.train else _OF_TRAINING,
+        "--split": ("folds",) if options.split is None else (),
+        "jacquard": () if options.dataset == "jacquard" else ("depth",),
+        "frames": () if options.dataset == "frames" else ("focal",),
+    }
+    parser = make_parser()
+    for other, names in without_effect.items():
+        for name in names:
+            value = getattr(options, name)
+            if value != parser.get_default(name):
+                raise ConfigError(f"--{name} without {other}", got=value, allowed="both or none")
     if not options.path.is_dir():
         raise ConfigError("no such folder", got=str(options.path), allowed=f"the folder of {options.dataset}")
 

@@ -68,12 +68,16 @@ def square(
     return Square(image=level(seen) if levelled else seen, centre=centre, side=float(side))
 
 
-def grasps(detector: GraspDetector, image: LabelledImage, count: int) -> list[GraspRectangle]:
-    """Return the best grasps of a detector in a square image, best first, in pixels of that image.
+def grasps(found: GraspMap, size: int, count: int) -> list[GraspRectangle]:
+    """Return the best grasps of a grasp map, best first, in pixels of the square image that it is of.
 
     The first one is the best pixel; others are maxima above `PEAK_THRESHOLD`, `PEAK_DISTANCE` apart.
+
+    Args:
+        found: what a detector made of the image.
+        size: side of the image [px].
+        count: number of grasps at most.
     """
-    found, size = predict(detector, image), image.depth.shape[0]
     scale = size / found.quality.shape[0]
     places = peaks(found.quality, threshold=PEAK_THRESHOLD, distance=PEAK_DISTANCE, count=count)
     if not len(places):

@@ -11,7 +11,7 @@ from mpgrasp.datasets.folds import spread
 from mpgrasp.datasets.labelled_image import LabelledImage
 from mpgrasp.datasets.rectangle_metric import best_iou, right
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.evaluate.predict import Square, grasps
+from mpgrasp.evaluate.predict import Square, grasps, predict
 from mpgrasp.grasp import GraspRectangle
 from mpgrasp.statistics import holm, mcnemar, wilson_interval
 
@@ -83,7 +83,7 @@ def score(detectors: Mapping[str, GraspDetector], seen: Square, fold: int | None
     """Return the score of every detector on a square of an image, which may be of a fold."""
     rows, image = [], seen.image
     for name, detector in detectors.items():
-        found = grasps(detector, image, TOP)
+        found = grasps(predict(detector, image), image.depth.shape[0], TOP)
         best = seen.back(found[0])
         rows.append(
             ImageScore(

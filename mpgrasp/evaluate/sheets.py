@@ -37,9 +37,8 @@ def prediction_sheet(images: Sequence[Square], detectors: Mapping[str, GraspDete
         above = [_tile(base, image.rectangles, LABEL)]
         below = [_tile(shade_depth(image.depth))]
         for detector in detectors.values():
-            found = grasps(detector, image, TOP)
-            above.append(_tile(base, found, COLOURS))
             maps = predict(detector, image)
+            above.append(_tile(base, grasps(maps, image.depth.shape[0], TOP), COLOURS))
             small = [
                 shade(maps.quality, 0.0, 1.0),
                 shade_lines(maps.angle, np.clip(maps.quality, 0, 1)),

@@ -13,7 +13,7 @@ from importlib.resources import files
 
 from markupsafe import Markup
 
-from mpgrasp.bench.report.names import name_of_controller as name_of
+from mpgrasp.bench.report.names import name_of_player
 from mpgrasp.bench.results.provenance import provenance
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.evaluate.paper import TABLE_II
@@ -28,10 +28,10 @@ Rows = list[tuple[str, ...]]
 
 
 def results_table(scored: Scored, options: Namespace) -> Rows:
-    """Return the table of results, its headings first; with the paper's rows where there are some."""
+    """Return the table of results, its headings first; beside what was trained, the paper's figures."""
     rows = scored.rows
     folds = any(row.fold is not None for row in rows)
-    paper = options.dataset == "cornell" and options.split is not None
+    paper = options.dataset == "cornell" and options.train
     table: Rows = [
         (
             "detector", "best right %", f"one of {TOP} right %", "at the border %",
@@ -53,7 +53,7 @@ def results_table(scored: Scored, options: Namespace) -> Rows:
 def _paper(detector: str, options: Namespace) -> str:
     channels = options.channels or "d"
     for row in TABLE_II:
-        if row.method == name_of(detector) and row.channels == channels:
+        if row.method == name_of_player(detector) and row.channels == channels:
             value = row.iw if options.split == "iw" else row.ow
             return "-" if value is None else f"{value:g}"
     return "-"

@@ -117,6 +117,8 @@ def test_objects_play_and_are_forgotten_afterwards(
         ({"detector": "resnet"}, "unknown detector; got 'resnet'"),
         ({"suite": "thick"}, "unknown suite"),
         ({"episodes": 0}, "unusable number"),
+        ({"detector": FakeDetector(), "workers": 2}, "objects play in this process alone; got .workers=2"),
+        ({"detector": {"one": FakeDetector()}, "weights": {"one": "absent.pt"}}, "absent.pt"),
         ({"detector": FakeDetector(), "settings": {"detector.size": 3}}, "no setting of"),
     ],
 )

@@ -18,7 +18,7 @@ from mpgrasp.datasets.cornell import Cornell
 from mpgrasp.detectors import make_detector
 from mpgrasp.detectors.networks.description import read_card
 from mpgrasp.evaluate.__main__ import main
-from mpgrasp.evaluate.predict import grasps, square
+from mpgrasp.evaluate.predict import grasps, predict, square
 from mpgrasp.evaluate.scores import ImageScore, Rate, paired_tests, rates, score
 from mpgrasp.geometry import line_angle_difference
 
@@ -68,7 +68,7 @@ def test_a_square_around_the_labels_stays_in_the_image(tmp_path: Path) -> None:
 
 def test_a_grasp_is_told_in_pixels_of_the_image(tmp_path: Path) -> None:
     image = square(Cornell(write_cornell(tmp_path / "c")).read("0101"), 300.0).image
-    (best, *_) = grasps(make_detector("heuristic"), image, 5)
+    (best, *_) = grasps(predict(make_detector("heuristic"), image), image.depth.shape[0], 5)
     (label,) = image.rectangles
     assert np.hypot(best.u - label.u, best.v - label.v) < 3
     assert best.jaw_px == pytest.approx(best.width_px / 2)
@@ -216,7 +216,11 @@ def test_rates_and_tests_are_those_of_the_rows() -> None:
         (["--weights", "missing.pt"], "missing.pt"),
         (["--train"], "--train without --split"),
         (["--train", "--split", "iw"], "--train without --out"),
-        (["--fold", "2"], "unusable --fold"),
+        (["--train", "--split", "iw", "--out", "o", "--fold", "6"], "unusable --fold; got 6"),
+        (["--fold", "2"], "--fold without --train; got 2"),
+        (["--lr", "0.01"], "--lr without --train; got 0.01"),
+        (["--folds", "4"], "--folds without --split; got 4"),
+        (["--focal", "500"], "--focal without frames; got 500"),
         (["--split", "ow", "--folds", "4"], "unusable number of folds of 1 objects"),
         (["--settings", "[1]"], "--settings is no JSON object"),
         (["--settings", '{"width": 8}'], "--settings without --train"),

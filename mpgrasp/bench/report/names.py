@@ -15,9 +15,9 @@ _NAMES = {
 
 def name_of(method: Method) -> str:
     """A detector and a controller in words."""
-    return " + ".join(_NAMES.get(name, name) for name in method)
+    return " + ".join(map(name_of_player, method))
 
 
-def name_of_controller(name: str) -> str:
-    """A controller in words."""
+def name_of_player(name: str) -> str:
+    """A detector or a controller in words."""
     return _NAMES.get(name, name)

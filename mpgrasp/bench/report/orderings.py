@@ -12,7 +12,7 @@ from mpgrasp.bench.analysis.paper import Baseline, Claim, Measure, controllers_o
 from mpgrasp.bench.analysis.summary import PairedTest
 from mpgrasp.bench.report.document import Table
 from mpgrasp.bench.report.intervals import p_text
-from mpgrasp.bench.report.names import name_of, name_of_controller
+from mpgrasp.bench.report.names import name_of, name_of_player
 from mpgrasp.statistics import FEWEST_PAIRS, SIGNIFICANCE
 
 Findings = Mapping[Baseline, Sequence[Finding]]
@@ -77,7 +77,7 @@ def _is_tested(found: Finding) -> bool:
 
 
 def _verdict_text(baseline: Baseline, findings: Sequence[Finding]) -> str:
-    names = " and ".join(name_of_controller(name) for name in controllers_of(baseline))
+    names = " and ".join(name_of_player(name) for name in controllers_of(baseline))
     counts = ", ".join(f"{n} {verdict}" for verdict, n in count_verdicts(findings).items() if n)
     return f"{baseline.capitalize()} baseline ({names}): {counts}."
 
