@@ -40,8 +40,8 @@ MAX_GRADIENT = 5.0
 """Gradients are shortened to this norm."""
 CHECKPOINT_EVERY = 180.0
 """Time between checkpoints [s]."""
-RESUMED = ("step", "elapsed", "validated", "best", "history")
-"""Plain values of a run that a checkpoint holds."""
+RESUMED = ("step", "elapsed", "validated", "best", "history", "average", "start")
+"""What a checkpoint holds of a run beside network, optimiser and losses."""
 READ_EVERY = 20
 """Losses of a GPU are read after so many steps, since each reading waits for it."""
 
@@ -275,23 +275,24 @@ class Trainer:
         """
         self._require_finite_weights()
         state = {"network": self.network.state_dict(), "optimiser": self.optimiser.state_dict()}
-        state |= {"average": self.average, "losses": self._losses}
-        state |= {name: getattr(self, name) for name in RESUMED}
+        state |= {"losses": self._losses, **{name: getattr(self, name) for name in RESUMED}}
         write_checkpoint(self.checkpoint, self.config, state)
 
     def resume(self) -> bool:
         """Continue where the checkpoint left off; False where there is none.
 
         Raises:
-            WeightsError: the checkpoint is unreadable or of a run with other settings.
+            WeightsError: the checkpoint is unreadable, or of a run with other settings or first weights.
         """
         if not self.checkpoint.is_file():
             return False
         state = read_checkpoint(self.checkpoint, self.config, self.device)
+        if self.start not in (None, state.get("start")):
+            raise WeightsError("checkpoint of a run that began with other weights", got=str(self.checkpoint))
         try:
             self.network.load_state_dict(state["network"])
             self.optimiser.load_state_dict(state["optimiser"])
-            self.average, self._losses = state["average"], state["losses"].cpu()
+            self._losses = state["losses"].cpu()
             for name in RESUMED:
                 setattr(self, name, state[name])
         except (KeyError, ValueError, RuntimeError) as error:

@@ -67,6 +67,23 @@ def test_a_training_goes_on_from_a_file_and_its_card_says_from_which(shards: Pat
     assert told["card"]["steps"] == first.step
 
 
+def test_a_resumed_run_knows_what_it_began_with(shards: Path, tmp_path: Path) -> None:
+    starts = []
+    for seed in (0, 1):
+        first = trainer(shards, tmp_path / f"first-{seed}.safetensors", seed=seed)
+        first.save()
+        starts.append(first.out)
+    out, dataset = tmp_path / "second.safetensors", first.dataset
+    begun = Trainer(config(), dataset, out, start=starts[0])
+    begun.save_checkpoint()
+    resumed = Trainer(config(), dataset, out)
+    assert resumed.resume()
+    assert resumed.start == begun.start is not None
+    assert Trainer(config(), dataset, out, start=starts[0]).resume()
+    with pytest.raises(WeightsError, match="began with other weights"):
+        Trainer(config(), dataset, out, start=starts[1]).resume()
+
+
 def test_weights_that_do_not_fit_are_not_gone_on_from(shards: Path, tmp_path: Path) -> None:
     first = trainer(shards, tmp_path / "first.safetensors")
     first.save()
