@@ -108,16 +108,18 @@ def test_a_program_that_breaks_its_word_is_one_error_and_is_ended(source: str, s
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "start_limit", "said"),
     [
-        (["no-such-program-here"], "cannot be started"),
-        ([sys.executable, "-c", "pass"], "did not get ready.*ended with code 0"),
-        ([sys.executable, "-c", "import time; time.sleep(9)"], "did not get ready.*no answer in time"),
-        ([sys.executable, "-c", "print('{}')"], "did not get ready"),
-        ("python net.py", "unusable command"),
-        ([], "unusable command"),
+        (["no-such-program-here"], 20.0, "cannot be started"),
+        ([sys.executable, "-c", "pass"], 20.0, "did not get ready.*ended with code 0"),
+        ([sys.executable, "-c", "import time; time.sleep(9)"], 1.0, "did not get ready.*no answer in time"),
+        ([sys.executable, "-c", "print('{}')"], 20.0, "did not get ready.*said '{}' in the place of 'ready'"),
+        ("python net.py", 20.0, "unusable command"),
+        ([], 20.0, "unusable command"),
     ],
 )
-def test_a_program_that_does_not_get_ready_is_refused(command: list[str], said: str) -> None:
+def test_a_program_that_does_not_get_ready_is_refused(
+    command: list[str], start_limit: float, said: str
+) -> None:
     with pytest.raises(ConfigError, match=said):
-        OtherProcess(command, start_limit=1.0)
+        OtherProcess(command, start_limit=start_limit)
