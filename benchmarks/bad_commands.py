@@ -202,6 +202,8 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("bench --resume file", "no run there (Not a directory)"),
     ("bench --resume broken", "broken/run.json cannot be used"),
     ("bench --resume run --out other", "--out beside --resume"),
+    ("bench single --scale 0.001", "--scale without --objects; got 0.001"),
+    ("bench single --density 900", "--density without --objects; got 900.0"),
     ("bench thin --objects box.stl", "--objects with a suite that is made for its own objects"),
     ("bench paper --objects box.stl", "--objects with several suites"),
     ("bench single --objects ''", "no such file or folder of objects; got ''"),

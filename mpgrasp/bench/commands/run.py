@@ -133,14 +133,12 @@ def make_parser() -> argparse.ArgumentParser:
         "--density",
         metavar="D",
         type=number(1, 25000, "kg/m^3"),
-        default=500.0,
         help="of these objects, which decides their mass, in kg/m^3 (default: 500)",
     )
     add(
         "--scale",
         metavar="M",
         type=number(1e-6, 1e3, "m"),
-        default=1.0,
         help="unit of the numbers in these files: 0.001 for millimetres (default: 1, metres)",
     )
     add_settings(parser)

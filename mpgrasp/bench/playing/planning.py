@@ -38,6 +38,9 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     Raises:
         ConfigError: input that cannot be used.
     """
+    for option in ("density", "scale"):
+        if getattr(arguments, option) is not None and not arguments.objects:
+            raise ConfigError(f"--{option} without --objects", got=getattr(arguments, option))
     only_detectors: Sequence[str] = ()
     own: dict[str, Path] = {}
     if arguments.detector is not None:
@@ -180,12 +183,13 @@ def _with_objects(
     if len(suites) > 1:
         raise ConfigError("--objects with several suites", got=arguments.suite, allowed="one suite")
     from mpgrasp.bench.meshes.intake import take_objects
+    from mpgrasp.scene.objects.from_mesh import DENSITY
 
     suite, verdicts = take_objects(
         suites[0],
         arguments.objects,
-        density=arguments.density,
-        scale=arguments.scale,
+        density=DENSITY if arguments.density is None else arguments.density,
+        scale=1.0 if arguments.scale is None else arguments.scale,
         workers=arguments.workers,
         quiet=arguments.quiet,
     )
