@@ -207,23 +207,45 @@ def crop_resize(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -
 
 def _resize_by_area(depth: NDArray[np.float32], size: int) -> NDArray[np.float32]:
     """Square depth image resized to `size` px; see `crop_resize`."""
-    if depth.shape[0] == size:
+    old = len(depth)
+    if old == size:
         return depth.copy()
-    index, weight, centre = _footprint(depth.shape[0], size)
-    reference = depth[np.ix_(centre, centre)]
+    centre = _footprint(old, size)[2]
+    if old < size:  # where OpenCV would interpolate
+        every = np.indices((size, size))
+        return _averaged_by_hand(depth, every[0], every[1], size)
+    holes = np.isnan(depth)
+    known = np.where(holes, np.float32(-1), depth) if (holed := bool(holes.any())) else depth
+    result = np.asarray(cv2.resize(known, (size, size), interpolation=cv2.INTER_AREA), np.float32)
+    # a footprint reaches no farther from its centre: where all of that is one surface, OpenCV is right
+    kernel = np.ones((2 * -(-old // (2 * size)) + 1,) * 2, np.uint8)
+    spread = cv2.dilate(known, kernel) - cv2.erode(known, kernel)
+    mixed = spread.take(centre, axis=0).take(centre, axis=1) >= EDGE_GAP
+    if holed:
+        lost = holes.take(centre, axis=0).take(centre, axis=1)
+        result[lost] = np.nan
+        mixed &= ~lost
+    rows, cols = np.divmod(np.flatnonzero(mixed), size)
+    result[rows, cols] = _averaged_by_hand(depth, rows, cols, size)
+    return result
+
+
+def _averaged_by_hand(
+    depth: NDArray[np.float32], rows: NDArray[np.intp], cols: NDArray[np.intp], size: int
+) -> NDArray[np.float32]:
+    """Pixels (...) at `rows` and `cols` (...) of an image resized to `size` px, at edges and holes too."""
+    index, weight, centre = _footprint(len(depth), size)
+    reference = depth[centre[rows], centre[cols]]
     total, mass = np.zeros_like(reference), np.zeros_like(reference)
-    w = np.empty_like(reference)
-    columns = [depth.take(col, axis=1) for col in index]  # each (old, new)
-    for row, row_weight in zip(index, weight, strict=True):
-        for column, col_weight in zip(columns, weight, strict=True):
-            offset = column.take(row, axis=0)
-            offset -= reference
+    across = [(index[k][cols], weight[k][cols]) for k in range(len(index))]
+    for k in range(len(index)):
+        row, row_weight = index[k][rows] * depth.shape[1], weight[k][rows]
+        for col, col_weight in across:
+            offset = depth.take(row + col) - reference
             near = np.abs(offset) < EDGE_GAP  # False where either is NaN
-            np.outer(row_weight, col_weight, out=w)
-            w *= near
+            w = row_weight * col_weight * near
             mass += w
-            w *= np.where(near, offset, np.float32(0))
-            total += w
+            total += w * np.where(near, offset, np.float32(0))
     return np.asarray(reference + total / np.where(mass > 0, mass, 1))
 
 

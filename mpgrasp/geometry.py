@@ -16,6 +16,7 @@ from mpgrasp.linear_algebra import dot, norm, product
 
 FloatArray = NDArray[np.floating]
 
+_IDENTITY = np.eye(4)
 MAX_SKEW = 1e-3
 """Most that a rotation misses length 1 or a right angle by; stored calibrations have few digits."""
 MAX_DISTANCE = 100.0
@@ -50,7 +51,7 @@ def check_pose(T: object, name: str) -> None:
 
 def transform(rotation: ArrayLike, position: ArrayLike) -> FloatArray:
     """Transform (4, 4) from a rotation (3, 3) and a position (3,) [m]."""
-    T = np.eye(4)
+    T = _IDENTITY.copy()
     T[:3, :3] = rotation
     T[:3, 3] = position
     return T

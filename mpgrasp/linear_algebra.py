@@ -15,6 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+try:
+    # einsum itself, without the call in Python that looks at its options and takes as long again
+    from numpy._core.multiarray import c_einsum as _einsum
+except ImportError:
+    from numpy import einsum as _einsum
+
 Array = NDArray[np.floating]
 
 _LARGEST_SVD = 24
@@ -34,12 +40,13 @@ class Svd(NamedTuple):
 
 def product(a: Array, b: Array) -> Array:
     """Return the product of a (m, n) and b (n, k) or (n,)."""
-    return np.asarray(np.einsum("ij,jk->ik" if b.ndim == 2 else "ij,j->i", a, b))
+    result: Array = _einsum("ij,jk->ik" if b.ndim == 2 else "ij,j->i", a, b)
+    return result
 
 
 def dot(a: Array, b: Array) -> float:
     """Return the scalar product of a (n,) and b (n,)."""
-    return float(np.einsum("i,i->", a, b))
+    return float(_einsum("i,i->", a, b))
 
 
 def norm(v: ArrayLike) -> float:

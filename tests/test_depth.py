@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpgrasp.depth import CameraIntrinsics, DepthFrame, crop_resize, inpaint
+from mpgrasp.depth import EDGE_GAP, CameraIntrinsics, DepthFrame, crop_resize, inpaint
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import invert, look_at, looking_down, transform_points
 
@@ -103,6 +103,31 @@ def test_holes_neither_spread_nor_vanish_in_resize() -> None:
     small = crop_resize(frame, 60, 40)
     assert np.isnan(small.depth).mean() == pytest.approx(400 / 3600, rel=0.15)
     assert np.nanmax(np.abs(small.depth - 0.5)) < 1e-6
+
+
+@pytest.mark.parametrize(("old", "size"), [(40, 26), (37, 12), (24, 30)])
+def test_resize_takes_the_mean_of_what_lies_near_the_centre(old: int, size: int) -> None:
+    """Pixel by pixel and overlap by overlap, as the docstring says it."""
+    rng = np.random.default_rng(old)
+    depth = (0.5 + rng.normal(0, 1e-3, (old, old))).astype(np.float32)
+    depth[5:15, 10:18] -= 0.05  # an object
+    depth[12:, 20:] += np.arange(old - 20, dtype=np.float32) * 0.006  # a slope that crosses the gap
+    depth[rng.random((old, old)) < 0.05] = np.nan
+    frame = _flat_frame(intrinsics=CameraIntrinsics(fx=50, fy=50, cx=1, cy=1, width=old, height=old))
+    small = crop_resize(replace(frame, depth=depth), old, size).depth
+    side = old / size
+    for row, col in np.ndindex(size, size):
+        centre = depth[int((row + 0.5) * side), int((col + 0.5) * side)]
+        total = mass = 0.0
+        for i, j in np.ndindex(old, old):
+            overlap = [
+                max(0.0, min(k + 1, (n + 1) * side) - max(k, n * side)) for k, n in ((i, row), (j, col))
+            ]
+            if overlap[0] * overlap[1] > 1e-6 and abs(depth[i, j] - centre) < EDGE_GAP:
+                mass += overlap[0] * overlap[1]
+                total += overlap[0] * overlap[1] * float(depth[i, j])
+        expected = total / mass if mass else np.nan
+        assert small[row, col] == pytest.approx(expected, abs=1e-6, nan_ok=True), (row, col)
 
 
 def test_colour_is_cropped_with_the_depth() -> None:

@@ -140,7 +140,7 @@ def apply(
     if noise.shadows:
         lost |= _shadows(disparity * np.float32(scale))
     if noise.max_incidence < np.pi / 2:
-        lost |= _grazing(depth, intrinsics, noise.max_incidence)
+        lost |= _grazing(depth, intrinsics, noise.max_incidence, noise.min_z)
     if noise.dropout > 0:
         lost |= lost_patches(correlated_noise(depth.shape, noise.dropout_px, rng), noise.dropout)
     measured[lost] = np.nan
@@ -194,19 +194,34 @@ def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def _grazing(
-    depth: NDArray[np.float32], intrinsics: CameraIntrinsics, max_incidence: float
+    depth: NDArray[np.float32], intrinsics: CameraIntrinsics, max_incidence: float, min_z: float
 ) -> NDArray[np.bool_]:
     """Pixels (H, W) of surfaces whose slope against the image plane is beyond `max_incidence` [rad].
 
-    A slope counts only where it goes on to both sides of a pixel, so that rims and narrow things are kept.
+    A slope counts only where it goes on to both sides of a pixel, so that rims and narrow things are kept;
+    and only at `min_z` [m] or farther, since what is nearer is missing anyway.
     """
-    bound = np.float32(np.tan(max_incidence))
+    bound = float(np.tan(max_incidence))
     grazing = np.zeros(depth.shape, bool)
-    step = np.diff(depth, axis=1)
-    grazing[:, 1:-1] = _steep(step[:, :-1], step[:, 1:], depth[:, 1:-1] * np.float32(bound / intrinsics.fx))
-    step = np.diff(depth, axis=0)
-    grazing[1:-1] |= _steep(step[:-1], step[1:], depth[1:-1] * np.float32(bound / intrinsics.fy))
+    across = _rows_with_steps(depth[:, 1:], depth[:, :-1], min_z * bound / intrinsics.fx)
+    some = depth[across]
+    step = np.diff(some, axis=1)
+    grazing[across, 1:-1] = _steep(
+        step[:, :-1], step[:, 1:], some[:, 1:-1] * np.float32(bound / intrinsics.fx)
+    )
+    down = _rows_with_steps(depth[1:], depth[:-1], min_z * bound / intrinsics.fy)
+    rows = down[1:][np.diff(down) == 1]  # with a step above and below
+    above, here, below = depth[rows - 1], depth[rows], depth[rows + 1]
+    grazing[rows] |= _steep(here - above, below - here, here * np.float32(bound / intrinsics.fy))
     return grazing
+
+
+def _rows_with_steps(
+    some: NDArray[np.float32], others: NDArray[np.float32], least: float
+) -> NDArray[np.intp]:
+    """Rows in which two images (h, w) differ anywhere by more than `least`; those with NaN too."""
+    largest = np.asarray(cv2.absdiff(some, others)).max(axis=1, initial=0)
+    return np.flatnonzero(~(largest <= least))
 
 
 def _steep(

@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mpgrasp.camera.height_field_mesh import height_field_mesh
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import CameraError
 from mpgrasp.forking import OPENGL, refuse_inherited, starting
@@ -166,6 +167,7 @@ class Rasteriser:
             getattr(self._option, decoration)[:] = 0
         self._free_camera = mujoco.MjvCamera()
         flags = self._scene.flags
+        self._field = None if colour else height_field_mesh(model)
         if not colour:
             flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
         if not fine:
@@ -192,7 +194,11 @@ class Rasteriser:
         )
         for eye in self._scene.camera:
             self._place(eye, T_world_camera)
+        field, i = self._field, self._intrinsics
+        triangles = None if field is None else field.take_over(self._scene, data, T_world_camera, i)
         mujoco.mjr_render(self._rect, self._scene, self._context)
+        if field is not None and triangles is not None:
+            field.draw(data, T_world_camera, _projection(i), triangles)
         shape = (self._intrinsics.height, self._intrinsics.width)
         if self._colour:
             rgb = np.empty((*shape, 3), np.uint8)
@@ -256,6 +262,20 @@ def _mask_colour() -> None:
     from OpenGL import GL  # type: ignore[import-untyped]
 
     GL.glColorMask(False, False, False, False)
+
+
+def _projection(i: CameraIntrinsics) -> FloatArray:
+    """Clip space (4, 4) of axes x right, y up, z backward, as MuJoCo has it: depth 1 at NEAR and 0 at FAR."""
+    right, down = 1 - (2 * i.cx + 1) / i.width, 1 - (2 * i.cy + 1) / i.height
+    slope = NEAR / (FAR - NEAR)
+    return np.array(
+        [
+            [2 * i.fx / i.width, 0, right, 0],
+            [0, 2 * i.fy / i.height, -down, 0],
+            [0, 0, slope, FAR * slope],
+            [0, 0, -1, 0],
+        ]
+    )
 
 
 def _z_depth(buffer: NDArray[np.float32]) -> NDArray[np.float32]:

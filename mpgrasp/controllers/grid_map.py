@@ -113,7 +113,12 @@ class GridMap:
         self._weight = np.zeros(ny * nx)
         self._weighted_width = np.zeros(ny * nx)
         self._weighted_height = np.zeros(ny * nx)
-        self._fresh: tuple[FloatArray, FloatArray] | None = None  # observations and mean quality
+        self.touched: NDArray[np.intp] = np.zeros(0, np.intp)
+        """(n,) flat indices of the cells into which pixels of the last view fell, rising."""
+        self._fresh: tuple[FloatArray, FloatArray] | None = (
+            None  # observations and mean quality, of all cells
+        )
+        self._stale: list[NDArray[np.intp]] = []  # cells that have changed since
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -149,27 +154,30 @@ class GridMap:
 
         Dropped are pixels without depth, outside of the grid, above the ceiling or below the floor.
         """
-        self._fresh = None
         c = self.config
         cells, z = self._locate(grasp_map)
-        seen = cells >= 0
-        index, z = cells[seen], z[seen]
-        quality = np.clip(grasp_map.quality[seen], 0.0, 1.0)
+        seen = np.flatnonzero(cells >= 0)
+        index, z = cells.take(seen), z.take(seen)
+        quality = np.clip(grasp_map.quality.take(seen), 0.0, 1.0)
         q_bin = np.minimum((quality * c.n_quality).astype(np.intp), c.n_quality - 1)
         # the camera looks down, so that world angle = image angle + heading of the image's u axis
         heading = image_to_world_angle(0.0, grasp_map.T_world_camera)
-        turns = grasp_map.angle[seen] / np.float32(np.pi) + np.float32(heading / np.pi + 0.5)
+        turns = grasp_map.angle.take(seen) / np.float32(np.pi) + np.float32(heading / np.pi + 0.5)
         angle_bin = np.minimum(((turns - np.floor(turns)) * c.n_angle).astype(np.intp), c.n_angle - 1)
-        width = grasp_map.width[seen] * grasp_map.depth[seen] / np.float32(grasp_map.intrinsics.fx)
+        width = grasp_map.width.take(seen) * grasp_map.depth.take(seen) / np.float32(grasp_map.intrinsics.fx)
 
         ones = np.float32(1.0)
         np.add.at(self.quality_counts.reshape(-1), index * c.n_quality + q_bin, ones)
         np.add.at(self.counts.reshape(-1), (index * c.n_angle + angle_bin) * c.n_quality + q_bin, ones)
         n = self._weight.size
-        weight = quality if c.weighted else np.ones_like(quality)
-        self._weight += np.bincount(index, weights=weight, minlength=n)
-        self._weighted_width += np.bincount(index, weights=weight * width, minlength=n)
-        self._weighted_height += np.bincount(index, weights=weight * z, minlength=n)
+        counts = np.bincount(index, minlength=n)
+        self._weight += np.bincount(index, weights=quality, minlength=n) if c.weighted else counts
+        if c.weighted:
+            width, z = width * quality, z * quality
+        self._weighted_width += np.bincount(index, weights=width, minlength=n)
+        self._weighted_height += np.bincount(index, weights=z, minlength=n)
+        self.touched = np.flatnonzero(counts)
+        self._stale.append(self.touched)
         return cells
 
     def _locate(self, grasp_map: GraspMap) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
@@ -179,10 +187,10 @@ class GridMap:
         R, t = grasp_map.T_world_camera[:3, :3], grasp_map.T_world_camera[:3, 3]
         a = (np.arange(k.width) - k.cx) / k.fx  # (W,)
         b = ((np.arange(k.height) - k.cy) / k.fy)[:, None]  # (H, 1)
-        depth = grasp_map.depth
         # single precision: 1e-7 of a metre is far below the sensor's noise
         x, y, z = (
-            depth * (R[i, 0] * a + R[i, 1] * b + R[i, 2]).astype(np.float32) + np.float32(t[i])
+            grasp_map.depth * ((R[i, 0] * a).astype(np.float32) + (R[i, 1] * b + R[i, 2]).astype(np.float32))
+            + np.float32(t[i])
             for i in range(3)
         )
         with np.errstate(invalid="ignore"):
@@ -193,7 +201,10 @@ class GridMap:
             seen &= np.isfinite(grasp_map.quality + grasp_map.angle + grasp_map.width)
             if grasp_map.measured is not None and not c.filled_counts:
                 seen &= grasp_map.measured
-            cells = np.where(seen, row * nx + col, -1.0).astype(np.intp)
+            row *= nx
+            row += col
+            row[~seen] = -1
+            cells = row.astype(np.intp)
         return cells, z
 
     def observations(self) -> FloatArray:
@@ -205,21 +216,31 @@ class GridMap:
         return self._summary()[1]
 
     def _summary(self) -> tuple[FloatArray, FloatArray]:
+        """Observations and mean quality, (ny, nx) each; of the cells that no view has changed, as before."""
         if self._fresh is None:
-            centres = self.quality_centres.astype(np.float32)
-            n = np.einsum("yxq->yx", self.quality_counts)
-            total = np.einsum("yxq,q->yx", self.quality_counts, centres)
-            mean = total / np.maximum(n, 1)
-            if self.config.prior_in_mean:
-                # the same count in every bin: their mean is 0.5
-                prior = np.float32(self.config.prior_count * self.config.n_angle * self.config.n_quality)
-                mean = np.where(n > 0, (total + prior / 2) / np.maximum(n + prior, 1), 0)
-            mean = np.clip(mean - self.failures, 0.0, 1.0)
+            self._fresh = (np.zeros(self.shape, np.float32),) * 2
+            self._stale = [np.arange(self._weight.size)]
+        if self._stale:
+            cells = self._stale[0] if len(self._stale) == 1 else np.unique(np.concatenate(self._stale))
+            n, mean = (known.copy() for known in self._fresh)
+            n.reshape(-1)[cells], mean.reshape(-1)[cells] = self._summary_of(cells)
             if not self.config.border_counts:
                 mean[[0, -1], :] = 0
                 mean[:, [0, -1]] = 0
-            self._fresh = n, mean
+            self._fresh, self._stale = (n, mean), []
         return self._fresh
+
+    def _summary_of(self, cells: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        """Observations (n,) in cells (n,), and their mean quality (n,)."""
+        counts = self.quality_counts.reshape(-1, self.config.n_quality).take(cells, axis=0)
+        n = np.einsum("cq->c", counts)
+        total = np.einsum("cq,q->c", counts, self.quality_centres.astype(np.float32))
+        mean = total / np.maximum(n, 1)
+        if self.config.prior_in_mean:
+            # the same count in every bin: their mean is 0.5
+            prior = np.float32(self.config.prior_count * self.config.n_angle * self.config.n_quality)
+            mean = np.where(n > 0, (total + prior / 2) / np.maximum(n + prior, 1), 0)
+        return n, np.clip(mean - self.failures.take(cells), 0.0, 1.0)
 
     def mean_angle(self, cell: tuple[int, int]) -> float:
         """Mean closing direction of a cell [rad], eq. 8, weighted by quality.

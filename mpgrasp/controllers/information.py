@@ -33,11 +33,21 @@ def cell_entropy(counts: FloatArray, prior: float = 0.0) -> FloatArray:
     return result
 
 
-def grid_entropy(grid: GridMap) -> FloatArray:
+def grid_entropy(grid: GridMap, before: FloatArray | None = None) -> FloatArray:
     """Entropy (ny, nx) [nat] of every cell with `prior_count` per angle and quality bin, hence N_theta of
     it per quality bin; log N_q, the maximum, where nothing was seen.
+
+    Args:
+        grid: the map.
+        before: what this function gave before the last view; all but that view's cells is taken from there.
     """
-    return cell_entropy(grid.quality_counts, grid.config.prior_count * grid.config.n_angle)
+    prior = grid.config.prior_count * grid.config.n_angle
+    if before is None:
+        return cell_entropy(grid.quality_counts, prior)
+    entropy = before.copy()
+    counts = grid.quality_counts.reshape(-1, grid.config.n_quality)
+    entropy.reshape(-1)[grid.touched] = cell_entropy(counts.take(grid.touched, axis=0), prior)
+    return entropy
 
 
 def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothing") -> FloatArray:
@@ -52,12 +62,13 @@ def information_gain(entropy: FloatArray, sigma: float, border: Border = "nothin
     kernel = np.exp(-0.5 * (offsets / max(sigma, 1e-9)) ** 2)
     kernel /= kernel.sum()
     image = np.asarray(entropy, np.float32)
-    if border == "mirror":
+    if border == "nothing" or radius < min(image.shape):
+        beyond = cv2.BORDER_CONSTANT if border == "nothing" else cv2.BORDER_REFLECT
+        gain = cv2.sepFilter2D(image, -1, kernel, kernel, borderType=beyond)
+    else:
         # a footprint may be wider than the grid, which OpenCV's own mirroring cannot serve
         padded = np.pad(image, radius, mode="symmetric")
         gain = cv2.sepFilter2D(padded, -1, kernel, kernel)[radius:-radius, radius:-radius]
-    else:
-        gain = cv2.sepFilter2D(image, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
     return np.asarray(gain, np.float32)
 
 
@@ -70,7 +81,7 @@ def exploration_cost(grid: GridMap, centre: FloatArray | None, height_fraction: 
     if centre is None:
         return np.zeros(grid.shape)
     x, y = grid.axes()
-    distance = np.hypot(x - centre[0], (y - centre[1])[:, None])  # (ny, nx)
+    distance = np.sqrt((x - centre[0]) ** 2 + ((y - centre[1]) ** 2)[:, None])  # (ny, nx)
     cost: FloatArray = distance * (1.0 - np.clip(height_fraction, 0.0, 1.0))
     return cost
 

@@ -51,6 +51,7 @@ class ReachingController:
         self.pool: list[Grasp] = []
         """B of Algorithm 1: the best grasp of every view."""
         self._diagnostics: dict[str, FloatArray | float | bool] = {}
+        self._entropy: FloatArray | None = None
 
     def remember_failure(self, position: FloatArray) -> None:
         """Lower quality around a failed grasp at world (3,) [m]; to be told anew after each `reset`."""
@@ -112,7 +113,7 @@ class ReachingController:
         c, k = self.config, grasp_map.intrinsics
         # a sixth of the field of view where it meets the table, in cells; mean of both image sides
         footprint = (k.width / k.fx + k.height / k.fy) / 2 * float(grasp_map.T_world_camera[2, 3])
-        entropy = grid_entropy(self.grid)
+        entropy = self._entropy = grid_entropy(self.grid, self._entropy)
         gain = information_gain(entropy, max(footprint, 0.0) / 6 / c.grid.cell, c.border)
         best = self.grid.best_cell()
         centre = None if best is None else self.grid.position(best)
@@ -137,8 +138,8 @@ class ReachingController:
         """
         x, y = self.grid.axes()
         dx, dy = x - camera[0], (y - camera[1])[:, None]
-        distance = np.hypot(dx, dy)  # (ny, nx)
-        near = distance <= max(self.config.window, float(distance.min()))
+        squared = dx * dx + dy * dy  # (ny, nx)
+        near = squared <= max(self.config.window**2, float(squared.min()))
         best, worst = values[near].max(), values[near].min()
         tied = near & (values >= best - max(_TIE_NAT, _TIE * (best - worst)))
         along = np.where(tied, dx * self._heading[0] + dy * self._heading[1], -np.inf)

@@ -95,7 +95,7 @@ class MotionMeter:
         self._velocities.append(np.array(velocity))
         if len(self._velocities) == 3:
             a, b, d = self._velocities
-            self._jerk_sum += float(np.sum((a - 2 * b + d) ** 2)) / dt**4
+            self._jerk_sum += norm(a - 2 * b + d) ** 2 / dt**4
             self._jerk_count += 1
 
     def statistics(self, time: float) -> MotionStatistics:

@@ -251,8 +251,8 @@ def _worst(
     limit: str, time: float, values: FloatArray, bounds: FloatArray, *, demanded: bool = False
 ) -> Reflex | None:
     """The joint that breaks its symmetric bound by the largest factor, if any does."""
-    ratio = np.abs(values) / bounds
-    if (ratio <= 1.0).all():  # False for NaN too
+    size = np.abs(values)
+    if (size <= bounds).all():  # False for NaN too
         return None
-    j = int(np.argmax(ratio))
+    j = int(np.argmax(size / bounds))
     return _reflex(limit, time, values[j], np.copysign(bounds[j], values[j]), joint=j + 1, demanded=demanded)

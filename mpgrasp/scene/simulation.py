@@ -108,7 +108,7 @@ class Simulation(MovingScene):
         `q += dq * SERVO_PERIOD` give a seamless motion, and a caller that falls silent stops the arm.
         Positions are cut at the joint limits.
         """
-        self._q_target = np.clip(q, panda.Q_MIN, panda.Q_MAX)
+        self._q_target = np.minimum(np.maximum(q, panda.Q_MIN), panda.Q_MAX)
         self._dq_target = np.array(dq, float)
         self._ramp_steps = round(SERVO_PERIOD / self._dt)
 

@@ -10,6 +10,7 @@ import pytest
 from toy_views import Blob, blob_map, flat_map
 
 from mpgrasp.controllers.grid_map import EXTENT_PUBLISHED, ROBUST_GRID, GridConfig, GridMap
+from mpgrasp.controllers.information import grid_entropy
 from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference, looking_down, wrap_half_pi
@@ -76,6 +77,28 @@ def test_histograms_agree_with_counting_pixel_by_pixel(yaw: float) -> None:
     assert np.abs(grid.counts - expected).sum() <= 0.01 * expected.sum()
     assert grid.counts.sum() == pytest.approx(expected.sum(), rel=0.01)
     np.testing.assert_array_equal(grid.counts.sum(axis=2), grid.quality_counts)
+
+
+@pytest.mark.parametrize("config", [SMALL, ROBUST])
+def test_a_map_that_is_asked_after_every_view_knows_what_one_asked_at_the_end_knows(
+    config: GridConfig,
+) -> None:
+    asked, silent = GridMap(config), GridMap(config)
+    entropy = None
+    for seed in range(4):
+        view = random_map(0.4 * seed, seed)
+        for grid in (asked, silent):
+            grid.update(view)
+            if seed == 2:
+                grid.suppress(np.array([0.5, 0.01]))
+        assert set(asked.touched.tolist()) == set(asked.update(view).ravel().tolist()) - {-1}
+        silent.update(view)
+        asked.best_cell()
+        entropy = grid_entropy(asked, entropy)
+    np.testing.assert_array_equal(asked.observations(), asked.quality_counts.sum(axis=2))
+    np.testing.assert_array_equal(asked.observations(), silent.observations())
+    np.testing.assert_array_equal(asked.mean_quality(), silent.mean_quality())
+    np.testing.assert_array_equal(entropy, grid_entropy(silent))
 
 
 def test_mean_quality_of_a_robust_cell_is_the_mean_of_bin_centres() -> None:
