@@ -137,8 +137,6 @@ def _bootstrap(
     method: Literal["BCa", "percentile"],
     confidence: float,
 ) -> tuple[float, float, float]:
-    from scipy.stats import bootstrap
-
     if not len(sample):
         return np.nan, np.nan, np.nan
     centre = float(statistic(sample))
@@ -146,6 +144,8 @@ def _bootstrap(
         return centre, np.nan, np.nan
     if np.ptp(sample) == 0:
         return centre, centre, centre  # every resample is the same, which BCa cannot divide by
+    from scipy.stats import bootstrap
+
     interval = bootstrap(
         (sample,),
         statistic,

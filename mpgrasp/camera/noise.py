@@ -19,6 +19,8 @@ from mpgrasp.depth import CameraIntrinsics
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.linear_algebra import norm
 
+_HALF_PIXEL = np.float32(0.5)
+
 
 @dataclass(frozen=True, kw_only=True)
 class DepthNoise:
@@ -179,17 +181,14 @@ def _shadows(disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
     one and is hidden there if something further right in the left image, hence nearer, falls on the same
     column or on a lower one.
     """
-    column = np.arange(disparity.shape[1], dtype=np.float32)
-    right = column - disparity
-    right[np.isnan(right)] = np.inf
-    # neighbours on one flat surface are a whole pixel apart: half of that rounds the band's width
-    bound = right[:, :-1] + np.float32(0.5)
     hidden = np.zeros(disparity.shape, bool)
-    # a row in which every pixel falls beyond the one before it hides none
-    rows = np.flatnonzero((right[:, 1:] < bound).any(axis=1))
-    nearest = np.minimum.accumulate(right[rows, ::-1], axis=1)[:, ::-1]
-    hidden[rows, :-1] = nearest[:, 1:] < bound[rows]
-    hidden[np.isinf(right)] = False
+    # neighbours on one flat surface are a whole pixel apart: half of that rounds the band's width, and a row
+    # in which no disparity jumps by more than that hides nothing
+    rows = _rows_with_steps(disparity[:, 1:], disparity[:, :-1], _HALF_PIXEL)
+    right = np.arange(disparity.shape[1], dtype=np.float32) - disparity[rows]
+    right[np.isnan(right)] = np.inf
+    nearest = np.minimum.accumulate(right[:, ::-1], axis=1)[:, ::-1]
+    hidden[rows, :-1] = (nearest[:, 1:] < right[:, :-1] + _HALF_PIXEL) & np.isfinite(right[:, :-1])
     return hidden
 
 
@@ -217,7 +216,7 @@ def _grazing(
 
 
 def _rows_with_steps(
-    some: NDArray[np.float32], others: NDArray[np.float32], least: float
+    some: NDArray[np.float32], others: NDArray[np.float32], least: float | np.float32
 ) -> NDArray[np.intp]:
     """Rows in which two images (h, w) differ anywhere by more than `least`; those with NaN too."""
     largest = np.asarray(cv2.absdiff(some, others)).max(axis=1, initial=0)

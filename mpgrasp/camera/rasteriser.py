@@ -81,6 +81,8 @@ def _new_gl_context() -> Any:
         CameraError: there is no GL on this machine.
     """
     starting(OPENGL)
+    # Mesa draws on the processor in the thread that asks: our images are too small for more of them to help
+    os.environ.setdefault("LP_NUM_THREADS", "0")
     try:
         if platform.system() == "Linux" and not os.environ.get("MUJOCO_GL"):
             # mujoco picks glfw by itself, which needs a display

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import mujoco
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from mpgrasp.geometry import FloatArray
 from mpgrasp.workspace import WORKSPACE_CENTRE
@@ -68,7 +68,7 @@ def make_cloth(
     if unevenness == 0 and wrinkles is None:
         return Cloth(np.zeros((n, n)))
     # Rice: a line through noise filtered by a Gaussian of sigma s has one crossing up per 2 pi sqrt(2) s
-    surface = gaussian_filter(noise, wavelength / (2 * np.pi * np.sqrt(2)) / GRID, mode="wrap")
+    surface = _smoothed(noise, wavelength / (2 * np.pi * np.sqrt(2)) / GRID)
     hem = round(HEM / GRID)
     inner = surface[hem:-hem, hem:-hem]
     surface = (surface - inner.mean()) * (unevenness / inner.std())
@@ -78,6 +78,16 @@ def make_cloth(
     ramp = np.clip(edge, 0, 1)
     surface = (surface - surface.min()) * np.minimum.outer(ramp, ramp)
     return Cloth(surface)
+
+
+def _smoothed(surface: FloatArray, sigma: float) -> FloatArray:
+    """Surface (n, n) through a Gaussian of `sigma` points that goes on at the other side of the cloth."""
+    radius = int(4 * sigma + 0.5)
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    kernel /= kernel.sum()
+    padded = np.pad(surface, radius, mode="wrap")
+    smooth = np.asarray(cv2.sepFilter2D(padded, cv2.CV_64F, kernel, kernel), float)
+    return smooth[radius : len(smooth) - radius, radius : len(smooth) - radius]
 
 
 def make_wrinkles(height: float, width: float, count: int, rng: np.random.Generator) -> FloatArray:

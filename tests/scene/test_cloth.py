@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.scene.cloth import GRID, HALF_EXTENT, make_cloth, make_wrinkles
@@ -63,3 +64,17 @@ def test_all_wrinkles_lie_on_the_cloth() -> None:
     heights = make_wrinkles(0.005, 0.03, 50, np.random.default_rng(5))
     assert heights.shape == (n, n)
     assert heights.min() >= 0
+
+
+@pytest.mark.parametrize("wavelength", [0.04, 0.06, 0.3, 1.0])
+def test_waves_are_noise_through_a_gaussian_that_goes_on_at_the_other_side(wavelength: float) -> None:
+    noise = np.random.default_rng(5).standard_normal((121, 121))
+    sigma = wavelength / (2 * np.pi * np.sqrt(2)) / GRID
+    smooth = gaussian_filter(noise, sigma, mode="wrap")
+    surface = make_cloth(0.001, wavelength, np.random.default_rng(5)).elevation[20:-20, 20:-20]
+    # what is left apart are a factor and a shift
+    np.testing.assert_allclose(
+        (surface - surface.mean()) / surface.std(),
+        (smooth[20:-20, 20:-20] - smooth[20:-20, 20:-20].mean()) / smooth[20:-20, 20:-20].std(),
+        atol=1e-9,
+    )

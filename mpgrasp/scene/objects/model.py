@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from mpgrasp.exceptions import AssetError, ConfigError
 from mpgrasp.geometry import FloatArray, rotation_from_quaternion, transform, transform_points
@@ -92,6 +91,8 @@ class Part:
             return np.pi * s[0] ** 2 * (2 * s[1] + 4 / 3 * s[0])
         if self.shape == "ellipsoid":
             return 4 / 3 * np.pi * s[0] * s[1] * s[2]
+        from scipy.spatial import ConvexHull, QhullError  # takes long to import, and few scenes need it
+
         try:
             return float(ConvexHull(self.points).volume)
         except QhullError:

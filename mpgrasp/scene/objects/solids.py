@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from mpgrasp.exceptions import AssetError
 from mpgrasp.geometry import FloatArray
@@ -80,6 +79,8 @@ def share_of_union(solids: Sequence[Solid]) -> float:
 
 
 def _contains(solid: Solid, points: FloatArray) -> FloatArray:
+    from scipy.spatial import ConvexHull  # takes long to import, and few objects need it
+
     found = np.zeros(len(points), bool)
     for piece in solid:
         planes = ConvexHull(piece).equations  # (m, 4)
