@@ -59,7 +59,7 @@ def robosuite() -> tuple[Step, Callable[[], Any], str]:
         camera_widths=SIZE,
         camera_depths=True,
         control_freq=20,
-        horizon=10**6,
+        horizon=50,  # after that the arm may have turned its camera to where there is nothing to draw
     )
     rng = np.random.default_rng(0)
     low, high = env.action_spec
