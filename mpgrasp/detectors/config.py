@@ -22,6 +22,9 @@ class NetworkDetectorConfig:
     """Smoothing of cosine and sine [px]."""
     width_sigma: float = 1.0
     """Smoothing of the width [px]."""
+    calibrated: bool = True
+    """True if the quality is the probability that a grasp lifts, where the weights tell how claims become
+    one; False for the quality as the network claims it."""
 
     def __post_init__(self) -> None:
         if self.crop < 1 or min(self.quality_sigma, self.angle_sigma, self.width_sigma) < 0:

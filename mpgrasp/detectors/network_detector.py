@@ -62,6 +62,7 @@ class NetworkDetector:
     ) -> None:
         self.name, self._input, self._width_px = weights.name, weights.input, weights.width_px
         self.config = config or NetworkDetectorConfig()
+        self._calibration = weights.calibration if self.config.calibrated else None
         self.reads_truth, self.reads_colour = False, weights.input.reads_colour
         self._network, self._mark, self._asked = weights, mark, runtime
         self._runtime: Runtime | None = None
@@ -183,7 +184,8 @@ class NetworkDetector:
         if not bool((np.abs(heads) < LARGEST).all()):
             _log.warning("%s: an output that is not finite; the frame has no grasp", self.name)
             heads = np.zeros_like(heads)
-        return postprocess(heads, self._width_px, self.config)
+        quality, angle, width = postprocess(heads, self._width_px, self.config)
+        return (quality if self._calibration is None else self._calibration(quality)), angle, width
 
     def _heads(self, image: Float32) -> Float32:
         """Return raw heads (4, size, size) for an input (channels, size, size)."""

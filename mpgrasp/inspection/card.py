@@ -36,6 +36,7 @@ def card(name: str, weights: Path | None) -> dict[str, Any]:
         "settings": dict(loaded.settings),
         "input": vars(loaded.input),
         "width_px": loaded.width_px,
+        "calibration": None if loaded.calibration is None else vars(loaded.calibration),
         "training": dict(loaded.card),
     }
 

@@ -1,4 +1,4 @@
-"""`python -m mpgrasp.training generate|train`: training data, and networks trained on them."""
+"""`python -m mpgrasp.training generate|train|calibrate`: training data, networks, and what these claim."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    from mpgrasp.training import generate, train
+    from mpgrasp.training import calibrate, generate, train
 
     parser = Parser(prog="python -m mpgrasp.training", description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="generate|train")
-    helps = (("generate", generate, "make a data set"), ("train", train, "train a network on one"))
+    commands = parser.add_subparsers(dest="command", required=True, metavar="generate|train|calibrate")
+    helps = (
+        ("generate", generate, "make a data set"),
+        ("train", train, "train a network on one"),
+        ("calibrate", calibrate, "make its claims probabilities"),
+    )
     for name, module, text in helps:
         command = commands.add_parser(name, description=module.__doc__, help=text)
         module.add_arguments(command)

@@ -11,6 +11,7 @@ from typing import Any
 
 from safetensors import SafetensorError, safe_open
 
+from mpgrasp.detectors.networks.calibration import Calibration
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.networks.registry import NETWORKS, declaration
 from mpgrasp.exceptions import ConfigError, WeightsError
@@ -47,6 +48,8 @@ class WeightsDescription:
     """Opening that a width output of 1 stands for, in pixels of the network's image [px]."""
     card: Mapping[str, Any]
     """Training card."""
+    calibration: Calibration | None = None
+    """Of the claimed quality; None where nobody has measured it."""
 
 
 def read_description(path: Path | str) -> WeightsDescription:
@@ -74,17 +77,26 @@ def read_description(path: Path | str) -> WeightsDescription:
     try:
         config = from_table(declaration(name).config, settings, "settings")
         presented = from_table(NetworkInput, _without_range_channel(image), "input")
+        scale = _value(path, metadata, "calibration") if "calibration" in metadata else None
+        calibration = None if scale is None else from_table(Calibration, scale, "calibration")
     except ConfigError as error:
         raise WeightsError(f"{path}: {shown(str(error), 4 * _SHOWN)}") from error
     _check_width(path, width_px, presented.size)
     _check_sizes(path, name, config, presented)
     return WeightsDescription(
-        network=name, settings=settings, config=config, input=presented, width_px=float(width_px), card=card
+        network=name,
+        settings=settings,
+        config=config,
+        input=presented,
+        width_px=float(width_px),
+        card=card,
+        calibration=calibration,
     )
 
 
 def read_card(path: Path | str) -> dict[str, Any]:
-    """Return all that a weights file says about itself: network, settings, input, unit of width, card.
+    """Return all that a weights file says about itself: network, settings, input, unit of width, card,
+    calibration.
 
     Raises:
         WeightsError: the file is unreadable, of another make, or says what cannot be.
@@ -96,6 +108,7 @@ def read_card(path: Path | str) -> dict[str, Any]:
         "input": asdict(about.input),
         "width_px": about.width_px,
         "card": about.card,
+        "calibration": None if about.calibration is None else asdict(about.calibration),
     }
 
 

@@ -14,6 +14,7 @@ from safetensors.torch import save_file
 from torch import nn
 
 from mpgrasp.depth import NETWORK_SIZE
+from mpgrasp.detectors.networks.calibration import Calibration
 from mpgrasp.detectors.networks.description import FORMAT, opened, read_description
 from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
 from mpgrasp.detectors.networks.registry import (
@@ -57,6 +58,8 @@ class NetworkWeights:
     """Opening that a width output of 1 stands for, in pixels of the network's image [px]."""
     card: Mapping[str, Any] = field(default_factory=dict)
     """Training card: data, seed, steps, time, metrics, licence."""
+    calibration: Calibration | None = None
+    """Of the claimed quality, if it was measured."""
 
 
 def save_weights(
@@ -75,6 +78,8 @@ def save_weights(
         "width_px": json.dumps(weights.width_px),
         "card": json.dumps(json_value(weights.card)),
     }
+    if weights.calibration is not None:
+        metadata["calibration"] = json.dumps(asdict(weights.calibration))
     tensors = {k: v.detach().cpu().contiguous() for k, v in (state or weights.network.state_dict()).items()}
     temporary = path.with_name(path.name + ".part")
     try:
@@ -122,6 +127,7 @@ def _read_safetensors(name: str, path: Path) -> NetworkWeights:
         input=about.input,
         width_px=about.width_px,
         card=about.card,
+        calibration=about.calibration,
     )
 
 

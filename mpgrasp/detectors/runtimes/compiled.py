@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from mpgrasp.detectors.networks.calibration import Calibration
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.runtimes.openvino import (
     OpenVinoRuntime,
@@ -40,6 +41,7 @@ class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     input: dict[str, Any]
     width_px: float
     file: str
+    calibration: dict[str, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +56,8 @@ class CompiledNetwork:
     runtime: Runtime
     weights: Path
     """The file that it was made from."""
+    calibration: Calibration | None = None
+    """Of the claimed quality, if it was measured."""
 
 
 def fingerprint(weights: Path) -> str | None:
@@ -84,12 +88,20 @@ def find(name: str, weights: Path) -> CompiledNetwork | None:
         return None
     try:
         image = NetworkInput(**note.input)
+        calibration = None if note.calibration is None else Calibration(**note.calibration)
     except (ConfigError, TypeError):
         return None
     runtime = OpenVinoRuntime.of_file(folder / Path(note.file).name, settings)
     if runtime is None:
         return None
-    return CompiledNetwork(name=name, input=image, width_px=note.width_px, runtime=runtime, weights=weights)
+    return CompiledNetwork(
+        name=name,
+        input=image,
+        width_px=note.width_px,
+        runtime=runtime,
+        weights=weights,
+        calibration=calibration,
+    )
 
 
 def remember(weights: NetworkWeights, mark: str, runtime: OpenVinoRuntime) -> None:
@@ -101,7 +113,13 @@ def remember(weights: NetworkWeights, mark: str, runtime: OpenVinoRuntime) -> No
         runtime: what was compiled.
     """
     if runtime.file is not None:
-        note = _Note(input=asdict(weights.input), width_px=weights.width_px, file=runtime.file.name)
+        scale = None if weights.calibration is None else asdict(weights.calibration)
+        note = _Note(
+            input=asdict(weights.input),
+            width_px=weights.width_px,
+            file=runtime.file.name,
+            calibration=scale,
+        )
         store_result(_KIND, _key(weights.name, mark, runtime.settings), note)
 
 
@@ -122,8 +140,18 @@ def made_ready(name: str, weights: Path) -> CompiledNetwork:
     ready = make_runtime(read)
     if mark is not None and mark == fingerprint(weights) and isinstance(ready, OpenVinoRuntime):
         remember(read, mark, ready)
+    return of_weights(read, ready, weights)
+
+
+def of_weights(read: NetworkWeights, runtime: Runtime, file: Path) -> CompiledNetwork:
+    """Return a network that was read from a file, with what computes it."""
     return CompiledNetwork(
-        name=name, input=read.input, width_px=read.width_px, runtime=ready, weights=weights
+        name=read.name,
+        input=read.input,
+        width_px=read.width_px,
+        runtime=runtime,
+        weights=file,
+        calibration=read.calibration,
     )
 
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.detectors.runtimes.compiled import CompiledNetwork, fingerprint, made_ready
+from mpgrasp.detectors.runtimes.compiled import fingerprint, made_ready, of_weights
 from mpgrasp.detectors.runtimes.runtime import has_cuda
 from mpgrasp.exceptions import ConfigError, MpgraspError
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
@@ -119,9 +119,7 @@ class _Shared:
 
             read = load_weights(name, weights)
             self._batch: TorchBatch | None = TorchBatch(read)
-            self.facts = CompiledNetwork(
-                name=name, input=read.input, width_px=read.width_px, runtime=self._batch, weights=weights
-            )
+            self.facts = of_weights(read, self._batch, weights)
         else:
             self._batch, self.facts = None, made_ready(name, weights)
         image = self.facts.input
@@ -140,6 +138,7 @@ class _Shared:
         return {
             "input": image,
             "width_px": self.facts.width_px,
+            "calibration": None if self.facts.calibration is None else asdict(self.facts.calibration),
             "runtime": runtime.name,
             "device": runtime.device,
             "cached": runtime.cached,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpgrasp.detectors.networks.calibration import Calibration
 from mpgrasp.detectors.networks.input import NetworkInput
 from mpgrasp.detectors.runtimes.compiled import CompiledNetwork
 from mpgrasp.detectors.runtimes.server import ADDRESS, HEADS, read, write
@@ -50,6 +51,8 @@ class SharedRuntime:
             raise told
         self.name, self.device, self.cached = f"shared {told['runtime']}", told["device"], told["cached"]
         self.input, self.width_px = NetworkInput(**told["input"]), float(told["width_px"])
+        scale = told["calibration"]
+        self.calibration = None if scale is None else Calibration(**scale)
         self._memory = SharedMemory(told["memory"])
         self._shape = self.input.channels, self.input.size, self.input.size
 
@@ -80,7 +83,12 @@ def shared_network(name: str, weights: Path) -> CompiledNetwork:
     """
     runtime = SharedRuntime(name, weights)
     return CompiledNetwork(
-        name=name, input=runtime.input, width_px=runtime.width_px, runtime=runtime, weights=weights
+        name=name,
+        input=runtime.input,
+        width_px=runtime.width_px,
+        runtime=runtime,
+        weights=weights,
+        calibration=runtime.calibration,
     )
 
 
