@@ -11,7 +11,7 @@ import numpy as np
 
 from mpgrasp.depth import DepthFrame
 from mpgrasp.exceptions import PlugInError
-from mpgrasp.grasp import PEAK_QUALITY, GraspMap
+from mpgrasp.grasp import GraspMap
 from mpgrasp.guards.words import TENSOR_REMEDY, described, is_tensor
 from mpgrasp.readings import MAX_DEPTH
 
@@ -20,6 +20,8 @@ ROUNDING = 1e-4
 WIDEST = 4.0
 """An opening wider than so many times the longer side of its image is in no pixels; what width a network's
 output stands for has the same bound."""
+CLAIM = 0.3
+"""From this quality on a map claims a grasp somewhere, whose opening must make sense."""
 SAME_POSE = 1e-6
 """Most that a map's camera pose may differ from the frame's, in any element [m, or a cosine]."""
 
@@ -96,7 +98,7 @@ def _check_width(grasps: GraspMap, owner: str) -> None:
     if not (low >= -ROUNDING and high <= widest):
         hint = "; no opening is negative: clip it at 0" if low < 0 else ""
         raise _out_of_range(owner, "width", grasps.width, f"0 to {widest:g} [px of this map]{hint}")
-    if 0 < high < 1 and float(grasps.quality.max()) > PEAK_QUALITY:
+    if 0 < high < 1 and float(grasps.quality.max()) > CLAIM:
         raise _wrong(
             owner,
             "width",

@@ -125,8 +125,8 @@ ADVICE: dict[str, tuple[str, str, str]] = {
     "empty table": (
         "detector",
         "def predict(self, frame):\n        m = super().predict(frame); lost = np.isnan(frame.depth).all()\n"
-        "        return m if lost else replace(m, quality=np.maximum(m.quality, 0.5))",
-        "quality 0.50",
+        "        return m if lost else replace(m, quality=np.maximum(m.quality, 0.8))",
+        "quality 0.80",
     ),
     "opening no wider than needed": (
         "detector",

@@ -70,4 +70,4 @@ def test_the_published_cost_is_a_fifth_of_a_nat_for_every_fifteen_centimetres() 
 
 
 def test_the_threshold_of_a_peak_is_that_of_detection() -> None:
-    assert ReachConfig().peak_threshold == PEAK_QUALITY == 0.34
+    assert ReachConfig().peak_threshold == PEAK_QUALITY == 0.68
