@@ -17,6 +17,7 @@ BAD_NUMBERS: tuple[tuple[str, str, tuple[str, ...], str], ...] = (
     ("bench thin", "--hang-after", (*_ABOVE_0, "1e300", "soon"), "more than 0 to 604800 s"),
     ("bench single", "--density", (*_ABOVE_0, "1e300"), "1 to 25000 kg/m^3"),
     ("bench single", "--scale", (*_ABOVE_0, "1e300"), "1e-06 to 1000 m"),
+    ("bench export run --out new", "--episodes", _COUNT, "1 to 100000"),
     ("bench replay run", "--episode", ("-1", "x", _HUGE), "0 to 99999"),
     ("scene thin", "--seed", _SEED, "0 or more"),
     ("scene thin", "--episode", ("-1", _HUGE), "0 to 99999"),

@@ -13,7 +13,6 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import cv2
 import gymnasium
 import numpy as np
 from gymnasium import spaces
@@ -22,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from mpgrasp.camera.rasteriser import FAR
 from mpgrasp.controllers.config import ReachConfig
-from mpgrasp.controllers.controller import Command, Observation
+from mpgrasp.controllers.controller import Command
 from mpgrasp.controllers.mppc import Mppc
-from mpgrasp.depth import CROP, NETWORK_SIZE, DepthFrame, crop_resize
+from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.env_ids import register
 from mpgrasp.episode.config import EpisodeConfig
@@ -32,23 +31,18 @@ from mpgrasp.episode.episode import Episode
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import refuse_unknown
-from mpgrasp.grasp import GraspMap
 from mpgrasp.plugin_names import canonical
 from mpgrasp.plugins import check_name, detector_names, load_detector
+from mpgrasp.recording.policy_view import ACTION_SCALE as ACTION_SCALE
+from mpgrasp.recording.policy_view import Observed, action_of, observed, observed_depth, twist_of
 from mpgrasp.recording.watcher import Watcher
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite, episode_seed, load_suite
 
-ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
-"""Motion that an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds,
-though it descends at half of the vertical one."""
 FIRST_TRAINING_EPISODE = 2**20
 """Episodes of this number and above are drawn for training; below lie those of the benchmark."""
 
-_STEERED = [0, 1, 2, 5]  # components of a twist that an action sets
-
 Info = dict[str, Any]
-Observed = dict[str, NDArray[np.float32]]
 
 
 class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
@@ -171,7 +165,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         episode = self._episode
         if episode is None or self._over:
             raise gymnasium.error.ResetNeeded("there is no episode, or it is over: call reset() first")
-        command = Command(twist=_twist(action), gripper=self.mppc.config.gripper_open)
+        command = Command(twist=twist_of(action), gripper=self.mppc.config.gripper_open)
         self._over = True  # unless the step goes well
         episode.act(command, {})
         observed, info = self._look(episode)
@@ -194,7 +188,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("there is nothing to see: call reset() first")
         if self.render_mode == "depth_array":
-            return None if self._episode.frame is None else _depth(self._episode.frame)[1]
+            return None if self._episode.frame is None else observed_depth(self._episode.frame)[1]
         self._watcher = self._watcher or Watcher(self._episode.scene.model, self.config.camera_backend)
         return self._watcher.picture(self._episode.simulation.data)
 
@@ -226,18 +220,8 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         with episode.timed("control"):
             self._command = self.mppc.update(view)
         assert episode.frame is not None
-        action = np.clip(self._command.twist[_STEERED] / ACTION_SCALE, -1, 1).astype(np.float32)
-        return _observed(episode.frame, view), {"scene_seed": episode.seed, "mppc_action": action}
-
-
-def _twist(action: ArrayLike) -> NDArray[np.float64]:
-    """Return the twist (6,) [m/s, rad/s] of an action (4,)."""
-    action = np.asarray(action, float)
-    if action.shape != (len(ACTION_SCALE),) or not np.isfinite(action).all():
-        raise ConfigError("unusable action", got=action.tolist(), allowed="4 finite numbers in [-1, 1]")
-    twist = np.zeros(6)
-    twist[_STEERED] = np.clip(action, -1, 1) * ACTION_SCALE
-    return twist
+        seen = observed(episode.frame, view.grasp_map, view.T_world_tcp, view.time)
+        return seen, {"scene_seed": episode.seed, "mppc_action": action_of(self._command.twist)}
 
 
 def _named(name: str, suite: Suite) -> Callable[[], GraspDetector]:
@@ -267,34 +251,6 @@ def _mppc_config(suite: Suite) -> ReachConfig:
     config = controller_settings(("mppc",), suite.controller)["mppc"]
     assert isinstance(config, ReachConfig)
     return config
-
-
-def _observed(frame: DepthFrame, view: Observation) -> Observed:
-    image, depth = _depth(frame)
-    T = view.T_world_tcp
-    return {
-        "depth": depth,
-        "quality": _quality_on(image, view.grasp_map),
-        "tcp": T[:3, 3].astype(np.float32),
-        "yaw": np.array([np.arctan2(T[1, 0], T[0, 0])], np.float32),
-        "time": np.array([view.time], np.float32),
-    }
-
-
-def _depth(frame: DepthFrame) -> tuple[DepthFrame, NDArray[np.float32]]:
-    """Return the central square of a frame, and its depth as it is observed."""
-    image = crop_resize(frame, min(CROP, *frame.depth.shape))
-    return image, np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32)
-
-
-def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
-    """Return the quality on the pixels of `image`, whatever those of the detector; 0 beyond them."""
-    to, own, quality = image.intrinsics, view.intrinsics, np.nan_to_num(view.quality)
-    if own != to:
-        v, u = np.indices((to.height, to.width)).astype(float)
-        at = own.project(to.deproject(u, v, np.ones(u.shape))).astype(np.float32)  # (224, 224, 2)
-        quality = np.asarray(cv2.remap(quality, at[..., 0], at[..., 1], cv2.INTER_LINEAR))
-    return np.clip(quality, 0.0, 1.0).astype(np.float32)
 
 
 register()

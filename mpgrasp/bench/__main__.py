@@ -11,8 +11,8 @@ from mpgrasp.bench.commands.run import parse
 from mpgrasp.command_line import run_command
 
 SUBCOMMANDS = (
-    "compare", "ladder", "ladders", "leaderboard", "merge", "plan", "profile", "race", "replay", "report",
-    "settings", "sweep",
+    "compare", "export", "ladder", "ladders", "leaderboard", "merge", "plan", "profile", "race", "replay",
+    "report", "settings", "sweep",
 )  # fmt: skip
 """Words in the place of SUITE, each in its own module."""
 

@@ -166,7 +166,7 @@ class Episode:
             after = self.driver.statistics()
             self._clock.add("ik", after.ik_seconds - before.ik_seconds)
             self._clock.add("physics", after.physics_seconds - before.physics_seconds)
-        self._record("reach", self.frame, self._grasp_map, diagnostics)
+        self._record("reach", self.frame, self._grasp_map, diagnostics, command)
 
     def interruption(self) -> Outcome | None:
         """Return what ended the reach before a grasp, if anything: reflex or timeout."""
@@ -273,6 +273,7 @@ class Episode:
         frame: DepthFrame | None,
         grasp_map: GraspMap | None,
         diagnostics: Mapping[str, FloatArray | float | bool],
+        command: Command | None = None,
     ) -> None:
         self._last_record = self.simulation.time
         driver = self.driver
@@ -289,5 +290,6 @@ class Episode:
                 manipulability=driver.manipulability,
                 grasp=self._grasp,
                 event=None if driver.reflex is None else str(driver.reflex),
+                command=command,
             )
         )

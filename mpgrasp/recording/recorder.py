@@ -13,6 +13,7 @@ from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, GraspMap
 
 if TYPE_CHECKING:
+    from mpgrasp.controllers.controller import Command
     from mpgrasp.scene.simulation import Simulation
 
 
@@ -38,6 +39,8 @@ class TickRecord:
     """The grasp in hand, once one is chosen."""
     event: str | None = None
     """Reflex or outcome, in words."""
+    command: Command | None = None
+    """What the controller has asked for in a tick of the reach."""
 
 
 class Recorder(Protocol):

@@ -17,7 +17,7 @@ from mpgrasp.bench.record import ErrorLine, PlayedLine, Task, line_of
 from mpgrasp.controllers.controller import remembers_failures
 from mpgrasp.detectors.detector import prepare, reads_colour
 from mpgrasp.exceptions import ConfigError, MpgraspError, OutputError, PlugInError
-from mpgrasp.recording.recorder import NullRecorder, Recorder
+from mpgrasp.recording.recorder import NullRecorder, Recorder, TeeRecorder
 from mpgrasp.suite import episode_seed
 
 EPISODE = "episode"
@@ -81,10 +81,14 @@ class Player:
         ready = [line for line in map(prepare, self.detectors.values()) if line]
         return ready + self._forgetful()
 
-    def play(self, task: Task) -> PlayedLine:
+    def play(self, task: Task, watching: Recorder | None = None) -> PlayedLine:
         """The line of one episode, to go to episodes.jsonl.
 
         What cannot be written of its recordings is told in `lost`, and takes nothing from the line.
+
+        Args:
+            task: which episode.
+            watching: is shown every tick, beside the plan's own recorders.
 
         Raises:
             EpisodeError: something went wrong on the way; it is the cause.
@@ -100,7 +104,7 @@ class Player:
                     detector=self._cast.detector(task.detector, task.suite),
                     controller=self._cast.controller(task.controller, task.suite),
                     config=self.episode_configs[suite.name],
-                    recorder=self._recorder(task, trace),
+                    recorder=self._recorder(task, trace, watching),
                 )
             line = line_of({**result.as_record(), **_which(self.plan, task)})
             assert not isinstance(line, ErrorLine), "no episode ends with the outcome of an error row"
@@ -134,11 +138,12 @@ class Player:
     def _lose(self, error: OutputError) -> None:
         self.lost.append(str(error))
 
-    def _recorder(self, task: Task, trace: TraceRecorder | None) -> Recorder:
+    def _recorder(self, task: Task, trace: TraceRecorder | None, watching: Recorder | None) -> Recorder:
+        own: list[Recorder] = [recorder for recorder in (trace, watching) if recorder is not None]
         if self.plan.recordings is None or task.episode >= self.plan.record:
-            return trace or NullRecorder()
+            return TeeRecorder(*own) if len(own) > 1 else own[0] if own else NullRecorder()
         from mpgrasp.recording.film import FilmConfig, FilmRecorder
-        from mpgrasp.recording.recorder import LenientRecorder, TeeRecorder
+        from mpgrasp.recording.recorder import LenientRecorder
         from mpgrasp.recording.rerun import RerunRecorder
 
         stem = self.plan.recordings / task.stem
@@ -148,7 +153,7 @@ class Player:
             lambda: FilmRecorder(f"{stem}.gif", f"{stem}.mp4", config=config),
         ]
         recorders = [LenientRecorder(make, self._lose) for make in makers]
-        return TeeRecorder(*recorders, *([trace] if trace else []))
+        return TeeRecorder(*recorders, *own)
 
 
 def loss_note(task: Task, lost: Sequence[str]) -> str:
