@@ -50,6 +50,8 @@ def _said_of_none(suffix: str, content: bytes) -> str:
     """Return what is said of a file that is none of its type."""
     if not content.strip() or suffix == ".obj":
         return _EMPTY
+    if suffix == ".glb":
+        return "GLB without its header"
     return _HEADER if suffix == ".ply" else _CUT.format(len(content))
 
 
@@ -99,7 +101,7 @@ BAD_MESHES: dict[str, BadMesh] = {
     # of no type that is read, or no file
     **{
         f"type-{suffix[1:]}": _raw("unknown type of file", stl(_BOX), suffix)
-        for suffix in (".off", ".glb", ".3mf", ".step", ".gz")
+        for suffix in (".off", ".gltf", ".3mf", ".step", ".gz")
     },
     "no-type": _raw("unknown type of file", stl(_BOX), ""),
     "folder": BadMesh(make=Path.mkdir, said="it is a directory|no mesh in folder"),
@@ -109,6 +111,12 @@ BAD_MESHES: dict[str, BadMesh] = {
     "circle": BadMesh(make=lambda path: path.symlink_to(path), said=_GONE),
     "dangling": BadMesh(make=lambda path: path.symlink_to("/nowhere"), said=_GONE),
     "huge": BadMesh(make=_large, said="more than 200 MB"),
+    # GLB
+    **{
+        f"{name}-glb": _raw(_said_of_none(".glb", content), content, ".glb")
+        for name, content in _NONE.items()
+    },
+    "glb-stl": _raw("GLB without its header", stl(_BOX), ".glb"),
     # STL
     "stl-half-header": _raw(_CUT.format(50), stl(_BOX)[:50]),
     "stl-header-alone": _raw(_CUT.format(84), stl(_BOX)[:84]),

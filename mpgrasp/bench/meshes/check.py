@@ -17,6 +17,7 @@ import msgspec
 import mujoco
 
 import mpgrasp
+from mpgrasp.bench.meshes.facts import ObjectFacts
 from mpgrasp.bench.meshes.files import ObjectFile
 from mpgrasp.bench.results.provenance import sha256
 from mpgrasp.bench.results.run_card import MeshCard
@@ -26,7 +27,7 @@ from mpgrasp.exceptions import AssetError, ConfigError, SimulationError
 from mpgrasp.files.cache import load_result, store_result
 from mpgrasp.files.json_values import json_value
 from mpgrasp.scene.config import SceneConfig
-from mpgrasp.scene.objects.from_mesh import CachedBody, mesh_key, read_body
+from mpgrasp.scene.objects.from_mesh import FRICTION, CachedBody, mesh_key, read_body
 from mpgrasp.scene.objects.model import ObjectModel
 from mpgrasp.scene.scene import build_scene
 
@@ -73,6 +74,7 @@ class MeshVerdict:
             sha256=self.sha256,
             reason=self.reason,
             mass=None if model is None else model.mass,
+            friction=None if model is None or model.friction == FRICTION else model.friction,
             size=None if model is None else model.size,
             pieces=None if model is None else len(model.parts),
             grasp_qualities=self.qualities,
@@ -90,8 +92,15 @@ def examine(file: ObjectFile, scene: SceneConfig, density: float) -> MeshVerdict
     verdict = MeshVerdict(name=file.name, path=str(file.path), sha256=sha256(file.path))
     try:
         body = read_body(file.path, file.scale)
-        model = body.as_object(file.name, density=density, provenance=f"mesh file {file.path.name}")
-        qualities = _best_grasps(model, scene, _poses_key(body.key, scene, density))
+        facts = file.facts
+        model = body.as_object(
+            file.name,
+            density=facts.density or density,
+            mass=facts.mass,
+            friction=facts.friction,
+            provenance=f"mesh file {file.path.name}",
+        )
+        qualities = _best_grasps(model, scene, _poses_key(body.key, scene, density, facts))
     except (AssetError, ConfigError, SimulationError) as error:
         return replace(verdict, reason=str(error))
     except ValueError as error:  # how MuJoCo's compiler complains
@@ -109,7 +118,7 @@ def is_cached(file: ObjectFile, scene: SceneConfig, density: float) -> bool:
         return True
     mesh = load_result("meshes", key, CachedBody)
     return mesh is not None and (
-        mesh.refused is not None or _cached_poses(_poses_key(key, scene, density)) is not None
+        mesh.refused is not None or _cached_poses(_poses_key(key, scene, density, file.facts)) is not None
     )
 
 
@@ -138,11 +147,11 @@ def _best_grasp(config: SceneConfig, seed: int) -> float | None:
     return float(antipodal_grasps(settled.height_map(data=data)).quality.max())
 
 
-def _poses_key(mesh: str, scene: SceneConfig, density: float) -> str:
+def _poses_key(mesh: str, scene: SceneConfig, density: float, facts: ObjectFacts) -> str:
     """Hash of all that decides in which poses a mesh comes to rest and what the hand can do there."""
     decides = [
-        mesh, density, REST_POSES, replace(scene, objects=("it",), count=None), HandGeometry(),
-        mujoco.__version__, mpgrasp.__version__,
+        mesh, facts.density or density, facts.mass, facts.friction, REST_POSES,
+        replace(scene, objects=("it",), count=None), HandGeometry(), mujoco.__version__, mpgrasp.__version__,
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(json_value(decides), sort_keys=True).encode()).hexdigest()
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import importlib.util
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mpgrasp.bench.meshes.facts import FILE, NOTHING_KNOWN, ObjectFacts, read_facts
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.names import MAX_NAME, printable, safe_name
 
@@ -32,18 +33,21 @@ class ObjectFile:
     """True if the hand must be able to close on it however it comes to rest, not just in some pose."""
     scale: float = 1.0
     """Unit of its numbers [m]."""
+    facts: ObjectFacts = NOTHING_KNOWN
+    """What is known of it besides."""
 
 
 def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, ...]:
     """The mesh files that the words of `--objects` stand for, each once, under different names.
 
     Args:
-        words: files, folders (all their OBJ, PLY and STL files, by name, and the one object of each folder in
-            them that has one of the `LAYOUTS`) or `ycb`.
+        words: files, folders (all their GLB, OBJ, PLY and STL files, by name, and the one object of each
+            folder in them that has one of the `LAYOUTS`) or `ycb`.
         scale: unit of the numbers in the files [m]; the scans are in metres.
 
     Raises:
-        ConfigError: a file or folder that is not there or holds no mesh, or scans that are not installed.
+        ConfigError: a file or folder that is not there or holds no mesh, scans that are not installed, or an
+            `objects.toml` beside meshes that cannot be used.
     """
     found: dict[Path, bool] = {}
     for word in words:
@@ -64,9 +68,17 @@ def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, 
         paths = _meshes_in(path) if stat.S_ISDIR(kind) else [path]
         found.update((path, False) for path in paths if path not in found)
     names = _different(safe_name(_name(path)) for path in found)
+    facts = _facts([path for path, strict in found.items() if not strict])
     return tuple(
-        ObjectFile(name=name, path=path, strict=strict, scale=1.0 if strict else scale)
+        ObjectFile(
+            name=name,
+            path=path,
+            strict=strict,
+            scale=1.0 if strict else known.scale or scale,
+            facts=known,
+        )
         for name, (path, strict) in zip(names, found.items(), strict=True)
+        for known in [facts.get(path, NOTHING_KNOWN)]
     )
 
 
@@ -79,9 +91,7 @@ def _meshes_in(folder: Path) -> list[Path]:
     from mpgrasp.scene.objects.surface import MESH_TYPES  # loads MuJoCo, which a help text can do without
 
     try:
-        inside = sorted(folder.iterdir())
-        paths = [path for path in inside if path.suffix.lower() in MESH_TYPES]
-        paths += [path for item in inside if item.is_dir() and (path := _one_object(item)) is not None]
+        paths = _meshes_among(folder)
     except OSError as error:
         raise ConfigError(
             "unreadable folder of objects", got=str(folder), allowed=f"a readable one ({error.strerror})"
@@ -95,18 +105,47 @@ def _meshes_in(folder: Path) -> list[Path]:
     return paths
 
 
+def _meshes_among(folder: Path) -> list[Path]:
+    """All meshes of a folder, and those of the folders of one object in it."""
+    from mpgrasp.scene.objects.surface import MESH_TYPES
+
+    inside = sorted(folder.iterdir())
+    paths = [path for path in inside if path.suffix.lower() in MESH_TYPES]
+    return paths + [path for item in inside if item.is_dir() and (path := _one_object(item)) is not None]
+
+
 def _one_object(folder: Path) -> Path | None:
     """The mesh of a folder that holds one object, if it has one of the usual layouts."""
     return next((path for layout in LAYOUTS if (path := folder / layout).is_file()), None)
 
 
+def _facts(paths: Iterable[Path]) -> dict[Path, ObjectFacts]:
+    """Facts of those meshes of which some are told."""
+    tables: dict[Path, Mapping[str, ObjectFacts]] = {}
+    found = {}
+    for path in paths:
+        folder = _home(path)[0].parent
+        if folder not in tables:
+            told = (folder / FILE).exists()
+            names = {_name(mesh) for mesh in _meshes_among(folder)} if told else set()
+            tables[folder] = read_facts(folder, names) if told else {}
+        if (known := tables[folder].get(_name(path))) is not None:
+            found[path] = known
+    return found
+
+
 def _name(path: Path) -> str:
     """Name of a mesh: of its file, or of its folder where the file has a name that all have."""
+    return _home(path)[1]
+
+
+def _home(path: Path) -> tuple[Path, str]:
+    """The file or folder that is the object, and its name."""
     for layout in LAYOUTS:
         depth = layout.count("/") + 1
         if path.as_posix().endswith(f"/{layout}"):
-            return path.parents[depth - 1].name
-    return path.stem
+            return path.parents[depth - 1], path.parents[depth - 1].name
+    return path, path.stem
 
 
 def _ycb_folder() -> Path:

@@ -159,6 +159,8 @@ class MeshCard(Record, frozen=True, kw_only=True, omit_defaults=True):
     reason: str | None = None
     mass: float | None = None
     """[kg]"""
+    friction: float | None = None
+    """Sliding friction coefficient, where it was told."""
     size: tuple[float, ...] | None = None
     """Edges of the bounding box [m]."""
     pieces: int | None = None

@@ -96,8 +96,16 @@ class MeshBody:
         x, y, z = np.ptp(np.vstack(self.pieces), axis=0)
         return float(x), float(y), float(z)
 
-    def as_object(self, name: str, *, density: float = DENSITY, provenance: str = "") -> ObjectModel:
-        """The object of a density [kg/m^3]; all its parts have friction against rolling.
+    def as_object(
+        self,
+        name: str,
+        *,
+        density: float = DENSITY,
+        mass: float | None = None,
+        friction: float | None = None,
+        provenance: str = "",
+    ) -> ObjectModel:
+        """The object of a mass [kg], or of a density [kg/m^3]; all its parts have friction against rolling.
 
         Raises:
             AssetError: a name that no object can have.
@@ -107,8 +115,8 @@ class MeshBody:
         return ObjectModel(
             name=name,
             parts=tuple(Part(shape="mesh", vertices=piece) for piece in self.pieces),
-            mass=density * self.volume,
-            friction=FRICTION,
+            mass=density * self.volume if mass is None else mass,
+            friction=FRICTION if friction is None else friction,
             rolls=True,  # a scanned can or ball says of itself only that it is a mesh
             provenance=provenance,
         )
@@ -144,7 +152,7 @@ def mesh_key(path: Path, scale: float = 1.0) -> str:
 
 
 def read_body(path: Path, scale: float = 1.0) -> MeshBody:
-    """The convex pieces of a mesh file (OBJ, PLY or STL); takes seconds unless it is cached.
+    """The convex pieces of a mesh file (GLB, OBJ, PLY or STL); takes seconds unless it is cached.
 
     Args:
         path: of the file.

@@ -12,7 +12,7 @@ import numpy as np
 from mpgrasp.exceptions import AssetError
 from mpgrasp.scene.objects.model import MAX_SIZE
 
-MESH_TYPES = (".obj", ".ply", ".stl")
+MESH_TYPES = (".glb", ".obj", ".ply", ".stl")
 """Endings of the files that are read, in lower case."""
 MIN_SIZE = 0.01
 """Least longest edge of an object's bounding box [m]; below, the units are wrong or a camera sees nothing."""
@@ -41,7 +41,7 @@ def load_surface(content: bytes, suffix: str, scale: float = 1.0) -> Any:
     if not content.strip():
         raise empty
     _CHECKS[suffix](content)
-    if suffix != ".stl":
+    if suffix in (".obj", ".ply"):
         content = _as_utf8(content, suffix)
     try:
         # as it is: a vertex that is no number would be left out, and a mesh that is far too small be a point
@@ -55,6 +55,8 @@ def load_surface(content: bytes, suffix: str, scale: float = 1.0) -> Any:
     if loaded.faces.min() < (-n if suffix == ".obj" else 0) or loaded.faces.max() >= n:  # OBJ counts back too
         raise AssetError("mesh has faces between vertices that it does not have")
     vertices = loaded.vertices if scale == 1 else np.asarray(loaded.vertices, float) * scale
+    if suffix == ".glb":  # whose y axis points up
+        vertices = np.asarray(vertices)[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
     corners = np.asarray(vertices, float)[loaded.faces].reshape(-1, 3)
     if not np.isfinite(corners).all():
         raise AssetError("mesh has vertices that are not numbers")
@@ -105,6 +107,17 @@ def _check_ply(content: bytes) -> None:
         )
 
 
+def _check_glb(content: bytes) -> None:
+    """Raise AssetError unless the content is a whole glTF 2 file that needs no other."""
+    if content[:4] != b"glTF" or len(content) < 20:
+        raise AssetError("GLB without its header", allowed="a binary glTF file")
+    version, length = (int.from_bytes(content[at : at + 4], "little") for at in (4, 8))
+    if version != 2:
+        raise AssetError("GLB of another version", got=version, allowed="glTF 2")
+    if length != len(content):
+        raise AssetError("GLB is cut off or too long", got=f"{len(content)} bytes", allowed=str(length))
+
+
 def _as_utf8(content: bytes, suffix: str) -> bytes:
     """Return the content of a text file in UTF-8, comments and names in Latin-1 included."""
     end = content.find(b"end_header") if suffix == ".ply" else -1
@@ -116,7 +129,9 @@ def _as_utf8(content: bytes, suffix: str) -> bytes:
     return head + rest
 
 
-_CHECKS: dict[str, Callable[[bytes], None]] = {".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl}
+_CHECKS: dict[str, Callable[[bytes], None]] = {
+    ".glb": _check_glb, ".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl,
+}  # fmt: skip
 """What a reader of files would not notice, by type."""
 
 

@@ -84,6 +84,47 @@ def test_a_mesh_in_millimetres_is_the_same_object_with_its_scale(tmp_path: Path)
     assert found[1].size == pytest.approx(found[0].size, rel=1e-6)
 
 
+def test_facts_beside_meshes_are_taken(tmp_path: Path) -> None:
+    box(tmp_path / "set" / "mug" / "textured.obj", (40, 50, 60))
+    box(tmp_path / "set" / "crate.stl")
+    box(tmp_path / "set" / "other.stl")
+    (tmp_path / "set" / "objects.toml").write_text(
+        "[mug]\nmass = 0.31\nscale = 0.001\nfriction = 0.4\n[crate]\ndensity = 700\n"
+    )
+    scene = load_suite("unseen").scenes[0]
+    found = {file.name: examine(file, scene, DENSITY) for file in find_objects([str(tmp_path / "set")])}
+    models = {name: verdict.model for name, verdict in found.items()}
+    assert all(model is not None for model in models.values()), found
+    volume = 0.04 * 0.05 * 0.06
+    masses = {name: model.mass for name, model in models.items() if model is not None}
+    assert masses == pytest.approx({"mug": 0.31, "crate": 700 * volume, "other": DENSITY * volume})
+    sizes = [model.size for model in models.values() if model is not None]
+    assert sizes == [pytest.approx((0.04, 0.05, 0.06))] * 3
+    assert [found[name].card().friction for name in ("mug", "crate", "other")] == [0.4, None, None]
+    # a file by its path has the same facts
+    (mug,) = find_objects([str(tmp_path / "set" / "mug" / "textured.obj")])
+    assert mug.facts.mass == 0.31
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[jug]\nmass = 1\n", "an object that is not beside it"),
+        ("[crate]\nweight = 1\n", "unknown key"),
+        ("[crate]\nmass = -1\n", "mass out of range"),
+        ("[crate]\nfriction = 90\n", "friction out of range"),
+        ("[crate]\nmass = 0.1\ndensity = 500\n", "a mass and a density"),
+        ("[crate]\nmass = 'much'\n", "mass"),
+        ("[crate\n", "cannot be read"),
+    ],
+)
+def test_facts_that_cannot_be_are_refused(text: str, said: str, tmp_path: Path) -> None:
+    box(tmp_path / "crate.stl")
+    (tmp_path / "objects.toml").write_text(text)
+    with pytest.raises(ConfigError, match=said):
+        find_objects([str(tmp_path)])
+
+
 def test_run_plays_what_is_usable_and_reports_the_rest(
     fake_world: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

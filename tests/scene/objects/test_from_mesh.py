@@ -37,6 +37,36 @@ def test_box_is_one_piece_of_its_size_and_mass(tmp_path: Path, suffix: str) -> N
     assert body.as_object("crate", density=250.0).mass == pytest.approx(250 * np.prod(EDGES), rel=1e-6)
 
 
+def test_a_glb_stands_as_it_does_where_y_points_up(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box((0.04, 0.05, 0.06)))
+    body = read_body(write(scene, tmp_path / "crate.glb"))
+    assert body.size == pytest.approx((0.04, 0.06, 0.05))  # what was deep is wide, what was high is high
+    # a node that turns and moves its mesh is obeyed
+    turned = trimesh.Scene()
+    turn = trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0), (0.3, 0.1, 0.2))
+    turned.add_geometry(trimesh.creation.box((0.04, 0.05, 0.06)), transform=turn)
+    assert read_body(write(turned, tmp_path / "t.glb")).size == pytest.approx((0.04, 0.05, 0.06))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda b: b[:-10], "cut off or too long"),
+        (lambda b: b + b"0000", "cut off or too long"),
+        (lambda b: b"glTG" + b[4:], "without its header"),
+        (lambda b: b[:4] + (1).to_bytes(4, "little") + b[8:], "another version; got 1"),
+        (lambda b: b[:12] + bytes(len(b) - 12), "unreadable GLB file|mesh is empty"),
+    ],
+)
+def test_a_damaged_glb_is_refused_in_one_line(change: Any, said: str, tmp_path: Path) -> None:
+    path = write(trimesh.Scene(trimesh.creation.box((0.04, 0.05, 0.06))), tmp_path / "crate.glb")
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(AssetError, match=said) as caught:
+        read_body(path)
+    assert "\n" not in str(caught.value)
+
+
 def test_u_shape_keeps_its_cavity(tmp_path: Path) -> None:
     body = read_body(write(u_shape(), tmp_path / "u.stl"))
     assert body.volume == pytest.approx((0.06 * 0.04 - 0.03 * 0.025) * 0.02, rel=1e-6)
