@@ -210,6 +210,11 @@ def make_parser() -> argparse.ArgumentParser:
         f"{HANG_AFTER['grasp']:g} for one grasp, {HANG_AFTER['clear']:g} for a table to be cleared)",
     )
     add("--quiet", action="store_true", help="no progress, only the table")
+    add(
+        "--no-report",
+        action="store_true",
+        help="no report and none of its pictures, which saves two seconds; `report DIR` makes one of the lines",
+    )
     parser.set_defaults(sweep=False, ladder=False, race=())
     return parser
 

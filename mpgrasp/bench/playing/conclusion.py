@@ -24,7 +24,12 @@ EXIT_BROKEN = 1
 
 
 def conclude(
-    directory: RunDirectory, lines: Sequence[Line], configuration: Configuration, *, finished: bool
+    directory: RunDirectory,
+    lines: Sequence[Line],
+    configuration: Configuration,
+    *,
+    finished: bool,
+    report: bool = True,
 ) -> int:
     """Put the lines into their folder, write and print what they add up to.
 
@@ -33,11 +38,13 @@ def conclude(
         lines: one of each episode, in the order of the plan.
         configuration: of the run.
         finished: True if no episode is missing.
+        report: write report.html and report.md too.
 
     Returns:
         The exit code that follows from it.
     """
-    from mpgrasp.bench.report.build import write_report
+    if report:
+        from mpgrasp.bench.report.build import write_report
 
     code = 0
     by_cells = by_cell(lines)
@@ -49,7 +56,8 @@ def conclude(
             RunSummary(complete=finished and not errors, cells=tuple(cells), paired_tests=tuple(tests))
         )
         prune_traces(directory.path / "traces")
-        write_report([directory.path], directory.path)
+        if report:
+            write_report([directory.path], directory.path)
     except OutputError as error:
         print_error(error)
         code = EXIT_BAD_INPUT

@@ -103,7 +103,7 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         shard=None if arguments.shard is None else Shard.parse(arguments.shard),
         record=arguments.record,
         recordings=out / "recordings",
-        traces=out / "traces",
+        traces=None if arguments.no_report else out / "traces",
     )
     return plan, out
 
@@ -153,7 +153,7 @@ def _ladder_plan(
         noise=not arguments.no_noise,
         record=arguments.record,
         recordings=out / "recordings",
-        traces=out / "traces",
+        traces=None if arguments.no_report else out / "traces",
     )
     return plan, out
 

@@ -89,7 +89,8 @@ def _run(plan: Plan, out: Path, arguments: argparse.Namespace, command: Sequence
             code = EXIT_BAD_INPUT
     with interrupts_wait():
         lines = directory.episodes().in_order(plan.roster().place)
-        return conclude(directory, lines, content.configuration, finished=finished) or code
+        report = not arguments.no_report
+        return conclude(directory, lines, content.configuration, finished=finished, report=report) or code
 
 
 def _play_batches(plan: Plan, directory: RunDirectory, crew: Crew, progress: RunProgress) -> bool:

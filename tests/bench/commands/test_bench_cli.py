@@ -13,7 +13,7 @@ from pathlib import Path
 
 import fakes
 import pytest
-from bench_runs import PLUG_INS, records
+from bench_runs import PLUG_INS, records, same_results, thin_command
 from full_disk import room_for
 from toy_recordings import shown
 
@@ -375,3 +375,15 @@ def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path, workers: int) -> No
     assert not summary["complete"]
     assert summary["cells"][0]["n"] == len(kept)
     assert "fakes:FakeDetector" in printed
+
+
+def test_a_run_without_a_report_has_all_else_and_gets_one_later(fake_world: object, tmp_path: Path) -> None:
+    with_one, without = tmp_path / "with", tmp_path / "without"
+    assert main(thin_command(with_one, episodes=2)) == 0
+    assert main([*thin_command(without, episodes=2), "--no-report"]) == 0
+    made = {name for name in os.listdir(with_one) if name not in os.listdir(without)}
+    assert made >= {"report.html", "report.md"}
+    assert made <= {"report.html", "report.md", "traces"}
+    assert same_results(with_one, without)
+    assert main(["report", str(without)]) == 0
+    assert (without / "report.html").is_file()
