@@ -213,7 +213,7 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--no-report",
         action="store_true",
-        help="no report and none of its pictures, which saves two seconds; `report DIR` makes one of the lines",
+        help="no report and none of its pictures, which saves two seconds; `report DIR` makes one later",
     )
     parser.set_defaults(sweep=False, ladder=False, race=())
     return parser
