@@ -219,7 +219,9 @@ def _rows_with_steps(
     some: NDArray[np.float32], others: NDArray[np.float32], least: float | np.float32
 ) -> NDArray[np.intp]:
     """Rows in which two images (h, w) differ anywhere by more than `least`; those with NaN too."""
-    largest = np.asarray(cv2.absdiff(some, others)).max(axis=1, initial=0)
+    if not some.size:
+        return np.zeros(0, np.intp)
+    largest = np.asarray(cv2.absdiff(some, others)).max(axis=1)
     return np.flatnonzero(~(largest <= least))
 
 

@@ -115,9 +115,7 @@ class GridMap:
         self._weighted_height = np.zeros(ny * nx)
         self.touched: NDArray[np.intp] = np.zeros(0, np.intp)
         """(n,) flat indices of the cells into which pixels of the last view fell, rising."""
-        self._fresh: tuple[FloatArray, FloatArray] | None = (
-            None  # observations and mean quality, of all cells
-        )
+        self._fresh: tuple[FloatArray, FloatArray] | None = None  # observations and mean quality
         self._stale: list[NDArray[np.intp]] = []  # cells that have changed since
 
     @property

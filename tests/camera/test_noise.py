@@ -114,6 +114,32 @@ def test_surfaces_at_grazing_angles_are_missing(axis: int) -> None:
         assert lost[80, 120] == expected
 
 
+def test_grazing_slopes_agree_with_looking_at_every_pixel() -> None:
+    rng = np.random.default_rng(6)
+    depth = np.full((30, 40), 0.5)
+    depth[5:12, 8:30] -= np.linspace(0, 0.3, 22)  # some of it steep, some not, and rims all around
+    depth[15:28, 10:20] += np.linspace(0, 0.4, 13)[:, None]
+    depth += rng.normal(0, 0.002, depth.shape)
+    image = CameraIntrinsics(fx=385.0, fy=300.0, cx=20.0, cy=15.0, width=40, height=30)
+    steepest = 1.0
+    noise = DepthNoise(**SILENT, shadows=False, max_incidence=steepest)
+    lost = np.isnan(apply(depth.astype(np.float32), image, rng, noise))
+    for row, col in np.ndindex(depth.shape):
+        expected = False
+        for line, k, focal in ((depth[row], col, image.fx), (depth[:, col], row, image.fy)):
+            if 0 < k < len(line) - 1:
+                before, after = line[k] - line[k - 1], line[k + 1] - line[k]
+                least = np.tan(steepest) * line[k] / focal
+                expected |= min(before, after) > least or max(before, after) < -least
+        assert lost[row, col] == expected, (row, col)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 2)])
+def test_images_too_small_for_slopes_and_shadows_come_back(shape: tuple[int, int]) -> None:
+    image = CameraIntrinsics(fx=385.0, fy=385.0, cx=0.0, cy=0.0, width=shape[1], height=shape[0])
+    assert np.isfinite(apply(_flat(0.5, image), image, np.random.default_rng(0), D435)).all()
+
+
 def test_rims_of_flat_objects_are_kept() -> None:
     depth = _flat(0.5, SMALL)
     depth[60:100, 100:140] = 0.42
