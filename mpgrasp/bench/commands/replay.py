@@ -102,15 +102,12 @@ def _replay(plan: Plan, arguments: Namespace) -> int:
 
 def _one_episode(plan: Plan, arguments: Namespace) -> tuple[Plan, Task]:
     """The plan with one method left, and the task."""
-    from mpgrasp.bench.results.cell_path import find_cell
+    from mpgrasp.bench.results.cell_path import choose_cell
 
     cells = [Cell(suite.name, *method) for suite in plan.suites for method in plan.methods]
-    if arguments.cell is None and len(cells) > 1:
-        names = [str(cell if len(plan.suites) > 1 else cell.method) for cell in cells]
-        raise ConfigError("the run has several cells", allowed=[f"--cell {name}" for name in names])
     if arguments.episode < 0:
         raise ConfigError("episode out of range", got=arguments.episode, allowed="0, 1, 2, ...")
-    cell = find_cell(cells, arguments.cell or str(cells[0]))
+    cell = choose_cell(cells, arguments.cell)
     task = Task(cell.suite, arguments.episode, cell.detector, cell.controller)
     recordings = arguments.out or arguments.run / "recordings"
     plan = replace(

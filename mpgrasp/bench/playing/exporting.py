@@ -13,7 +13,7 @@ from mpgrasp.bench.playing.crew import shared_networks
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.player import Player
 from mpgrasp.bench.record import Cell, ErrorLine, PlayedLine
-from mpgrasp.bench.results.cell_path import find_cell
+from mpgrasp.bench.results.cell_path import choose_cell
 from mpgrasp.bench.results.reader import read_lines
 from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.recording.demonstration import DemonstrationRecorder
@@ -94,10 +94,7 @@ def _facts(line: PlayedLine) -> dict[str, Any]:
 
 def _cell(plan: Plan, name: str | None) -> Cell:
     cells = [Cell(suite.name, *method) for suite in plan.suites for method in plan.methods]
-    if name is None and len(cells) > 1:
-        names = [str(cell if len(plan.suites) > 1 else cell.method) for cell in cells]
-        raise ConfigError("the run has several cells", allowed=[f"--cell {name}" for name in names])
-    cell = find_cell(cells, name or str(cells[0]))
+    cell = choose_cell(cells, name)
     if plan.suite(cell.suite).trial != "grasp":
         raise ConfigError(
             "demonstrations are of one grasp", got=cell.suite, allowed="a suite with one grasp an episode"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from mpgrasp.bench.record import Cell, Cells
@@ -38,3 +38,20 @@ def read_cells(text: str) -> tuple[Path, Cells]:
         return folder, cells
     cell = find_cell(cells, path.relative_to(folder).as_posix())
     return folder, {cell: cells[cell]}
+
+
+def choose_cell(cells: Sequence[Cell], name: str | None) -> Cell:
+    """Return the cell of that name, or the only one where none is given.
+
+    Args:
+        cells: of a run.
+        name: [suite/]detector/controller.
+
+    Raises:
+        ConfigError: no such cell, or several and no name.
+    """
+    if name is None and len(cells) > 1:
+        alike = len({cell.suite for cell in cells}) == 1
+        names = [str(cell.method if alike else cell) for cell in cells]
+        raise ConfigError("the run has several cells", allowed=[f"--cell {name}" for name in names])
+    return find_cell(cells, name or str(cells[0]))
