@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mpgrasp.depth import NETWORK_SIZE
 
 if TYPE_CHECKING:
-    from torch import nn
+    from torch import Tensor, nn
 
 HEADS = ("pos", "cos", "sin", "width")
 """Outputs of every network in this order; `<head>_output` in checkpoints."""
@@ -31,6 +31,9 @@ class PublishedWeights:
     """Training data, source and licence."""
     sizes: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     """Settings that are read from the shape of a tensor: its name, and the axis."""
+    read: Callable[[Mapping[str, Tensor]], tuple[dict[str, Any], dict[str, Tensor]]] | None = None
+    """Returns the settings of such a state dict, and its tensors by the names that the network has for them;
+    None where the names are the same."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,22 +5,33 @@ blocks are Swin's (Liu et al., https://arxiv.org/abs/2103.14030), the decoder's 
 et al., https://arxiv.org/abs/2105.05537). The defaults are the settings of the authors' code
 (https://github.com/WangShaoSUN/grasp-transformer, main.py and models/swin.py): patches of 4 px, 48 channels,
 two blocks a stage, windows of 7, skip connections that concatenate a stage's input and reduce the two
-linearly, heads without bias at full resolution. One departure: where a token is expanded to 2x2 or 4x4, its
-parts go to where the token was, as in Swin-Unet; the authors' code reshapes without interleaving, which moves
-them elsewhere in the image.
+linearly, heads without bias at full resolution. Two departures: where a token is expanded to 2x2 or 4x4, its
+parts go to where the token was, as in Swin-Unet, while the authors' code reshapes without interleaving, which
+moves them elsewhere in the image; and perceptrons have GELU as Swin's, not ReLU. State dicts of the authors'
+code are computed as that code does.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, MAX_REPEATS, NetworkDeclaration
+from mpgrasp.detectors.networks.declaration import (
+    HEADS,
+    MAX_CHANNELS,
+    MAX_REPEATS,
+    NetworkDeclaration,
+    PublishedWeights,
+)
+from mpgrasp.detectors.networks.tfgrasp_published import read_published
 from mpgrasp.exceptions import ConfigError
+
+Activation = Literal["gelu", "relu"]
 
 PATCH = 4
 """Side of the patches that become tokens [px]."""
@@ -52,6 +63,10 @@ class TFGraspConfig:
     """Hidden channels of the perceptrons, in units of the stage's."""
     drop_path: float = 0.1
     """Probability that training skips the last block; it rises linearly from 0 at the first."""
+    activation: Activation = "gelu"
+    """Of the perceptrons."""
+    interleaved: bool = True
+    """True if the parts of an expanded token go to where it was; False as in the authors' code."""
 
     def __post_init__(self) -> None:
         # JSON knows no tuples
@@ -67,6 +82,8 @@ class TFGraspConfig:
                 allowed=f"sizes of 1 to {MAX_CHANNELS}, window, mlp_ratio, depths and their number of 1 to"
                 f" {MAX_REPEATS}, as many depths as heads, drop_path from 0 to below 1",
             )
+        if self.activation not in get_args(Activation):
+            raise ConfigError("unknown activation", got=self.activation, allowed=get_args(Activation))
         if any(self.embed * 2**k % h for k, h in enumerate(self.heads)):
             raise ConfigError("attention heads that do not share out the channels", got=self.heads)
         unit = PATCH * self.window * 2 ** (len(self.depths) - 1)
@@ -91,11 +108,12 @@ class TFGrasp(nn.Module):
         self.merge = nn.ModuleList(_Merge(width) for width in widths[:-1])
         self.norm = nn.LayerNorm(widths[-1])
         # decoder, finest stage first
-        self.expand = nn.ModuleList(_Expand(width, 2, width // 2) for width in widths[1:])
+        together = c.interleaved
+        self.expand = nn.ModuleList(_Expand(width, 2, width // 2, together) for width in widths[1:])
         self.reduce = nn.ModuleList(nn.Linear(2 * width, width) for width in widths[:-1])
         self.decoder = nn.ModuleList(_Stage(c, k, rates[k].tolist()) for k in stages[:-1])
         self.decoder_norm = nn.LayerNorm(c.embed)
-        self.pixels = _Expand(c.embed, PATCH, c.embed)
+        self.pixels = _Expand(c.embed, PATCH, c.embed, together)
         for module in self.modules():
             if isinstance(module, nn.Linear):
                 # layers of 48 to 384 channels need more than the 0.02 of large ones, or all tokens stay alike
@@ -123,8 +141,7 @@ class TFGrasp(nn.Module):
         pixels = self.pixels.parts(self.decoder_norm(tokens))  # (n, size/4, size/4, 4, 4, embed)
         # the four 1x1 convolutions as one, before the pixels are put in their places: four channels to move
         weights = torch.cat([getattr(self, f"{name}_output").weight for name in HEADS]).flatten(1)
-        maps = F.linear(pixels, weights).float().permute(0, 5, 1, 3, 2, 4)
-        maps = maps.reshape(x.shape[0], len(HEADS), self.config.size, self.config.size)
+        maps = self.pixels.placed(F.linear(pixels, weights).float()).permute(0, 3, 1, 2)
         pos, cos, sin, width = torch.split(maps, 1, dim=1)
         return pos, cos, sin, width
 
@@ -152,7 +169,9 @@ class _Block(nn.Module):
         self.norm1, self.norm2 = nn.LayerNorm(width), nn.LayerNorm(width)
         self.attention = _Attention(width, config.heads[stage], config.window)
         self.mlp = nn.Sequential(
-            nn.Linear(width, width * config.mlp_ratio), nn.GELU(), nn.Linear(width * config.mlp_ratio, width)
+            nn.Linear(width, width * config.mlp_ratio),
+            nn.GELU() if config.activation == "gelu" else nn.ReLU(),
+            nn.Linear(width * config.mlp_ratio, width),
         )
         mask = _shift_mask(side, config.window, shift) if shift else None
         self.register_buffer("mask", mask, persistent=False)
@@ -248,11 +267,11 @@ class _Merge(nn.Module):
 
 
 class _Expand(nn.Module):
-    """A token into factor x factor tokens of width `outputs`, where it was."""
+    """A token into factor x factor tokens of width `outputs`, where it was if they stay together."""
 
-    def __init__(self, width: int, factor: int, outputs: int) -> None:
+    def __init__(self, width: int, factor: int, outputs: int, together: bool) -> None:
         super().__init__()
-        self.factor = factor
+        self.factor, self.together = factor, together
         self.expand = nn.Linear(width, outputs * factor**2, bias=False)
         self.norm = nn.LayerNorm(outputs)
 
@@ -262,10 +281,15 @@ class _Expand(nn.Module):
         y: Tensor = self.norm(self.expand(x).reshape(n, height, across, self.factor, self.factor, -1))
         return y
 
-    def forward(self, x: Tensor) -> Tensor:
-        n, height, across, _ = x.shape
-        parts = self.parts(x).transpose(2, 3)
+    def placed(self, parts: Tensor) -> Tensor:
+        """Put parts (n, H, W, factor, factor, any) in their places (n, H * factor, W * factor, any)."""
+        n, height, across = parts.shape[:3]
+        if self.together:
+            parts = parts.transpose(2, 3)
         return parts.reshape(n, height * self.factor, across * self.factor, -1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return self.placed(self.parts(x))
 
 
 DECLARATIONS = {
@@ -273,5 +297,15 @@ DECLARATIONS = {
         network=TFGrasp,
         config=TFGraspConfig,
         source="[TF-Grasp](https://arxiv.org/abs/2202.11911)",
+        published=PublishedWeights(
+            entry="patch_embed.proj.weight",
+            width_px=150.0,
+            read=read_published,
+            card={
+                "data": "Cornell or Jacquard",
+                "source": "https://github.com/WangShaoSUN/grasp-transformer",
+                "licence": "none given",
+            },
+        ),
     ),
 }

@@ -159,6 +159,8 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
                 raise WeightsError(f"weights of {other}, not of {name}", got=str(path), allowed=f"as {other}")
     settings = {setting: _size(state, *place) for setting, place in declared.published.sizes.items()}
     settings = {key: value for key, value in settings.items() if value is not None}
+    if declared.published.read is not None:
+        settings, state = declared.published.read(state)
     modality = next((kind for kind, n in CHANNELS.items() if n == settings.get("channels", 1)), None)
     if modality is None:
         raise WeightsError(

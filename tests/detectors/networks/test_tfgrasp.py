@@ -94,7 +94,7 @@ def test_the_mask_parts_tokens_that_the_roll_brought_together() -> None:
 
 def test_expanded_parts_stay_where_their_token_was() -> None:
     torch.manual_seed(0)
-    expand = _Expand(8, 2, 4)
+    expand = _Expand(8, 2, 4, together=True)
     x = torch.randn(1, 3, 3, 8, requires_grad=True)
     expand(x)[0, 3, 4].square().sum().backward()
     assert x.grad is not None

@@ -95,7 +95,7 @@ def test_published_state_dicts_under_the_wrong_name_are_told_the_right_one(
         load_weights(name, tmp_path / "published.pt")
 
 
-@pytest.mark.parametrize("name", ["dhrnet", "tfgrasp", "unet"])
+@pytest.mark.parametrize("name", ["dhrnet", "fcn", "unet"])
 def test_other_networks_read_no_pickles(name: str, tmp_path: Path) -> None:
     torch.save(build_network("ggcnn", {}).state_dict(), tmp_path / "published.pt")
     with pytest.raises(WeightsError, match=f"{name} reads safetensors only"):
