@@ -90,6 +90,7 @@ _FAST = "--detector oracle --controller open_loop"
 
 _LINES: tuple[tuple[str, str], ...] = (
     ("bench thin --episodes @digits", "--episodes: unusable number; got '99999"),
+    ("bench thin --max-episodes 20", "--max-episodes without --until-ci; got 20; allowed: --episodes"),
     ("bench thin --until-ci 10 --episodes 50 --max-episodes 20", "max-episodes out of range; got 20"),
     # what plays
     ("bench", f"{_REQUIRED}SUITE"),

@@ -22,6 +22,8 @@ EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 2, 130, 141
 GL_BACKENDS = ("", "egl", "osmesa", "glfw", "glx", "wgl", "cgl", "enable", "enabled", "on", "true", "1",
                "disable", "disabled", "off", "false", "0")  # fmt: skip
 """Values of MUJOCO_GL that MuJoCo takes."""
+MOST_UNTIL_CI = 1000
+"""Episodes after which a run that waits for narrow intervals, or a race, ends unless told otherwise."""
 MOST_EPISODES = 1_000_000
 """Most episodes of each combination: days of work for a hundred cores."""
 LARGEST = 2**63 - 1

@@ -8,7 +8,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mpgrasp.command_line import COUNT, MOST_EPISODES, SEED, WORKERS, Parser, number, whole
+from mpgrasp.command_line import (
+    COUNT,
+    MOST_EPISODES,
+    MOST_UNTIL_CI,
+    SEED,
+    WORKERS,
+    Parser,
+    number,
+    whole,
+)
 from mpgrasp.exceptions import ConfigError
 
 if TYPE_CHECKING:
@@ -34,6 +43,7 @@ examples:
   python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
   python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
   python -m mpgrasp.bench report RUN                 (see report --help)
+  python -m mpgrasp.bench export RUN --out demos     (see export --help)
   python -m mpgrasp.bench leaderboard RUN RUN         (see leaderboard --help)
   python -m mpgrasp.bench settings thin              (see settings --help)
   python -m mpgrasp.bench sweep thin --set ...       (see sweep --help)
@@ -116,8 +126,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--max-episodes",
         metavar="M",
         type=COUNT,
-        default=1000,
-        help="where --until-ci ends in any case (default: 1000)",
+        help=f"where --until-ci ends in any case (default: {MOST_UNTIL_CI})",
     )
     add(
         "--objects",

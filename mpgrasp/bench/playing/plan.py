@@ -14,7 +14,7 @@ from mpgrasp.bench.analysis.sweep import Sweep
 from mpgrasp.bench.playing.roster import Roster
 from mpgrasp.bench.record import Method, Task
 from mpgrasp.camera.backends import BACKENDS
-from mpgrasp.command_line import LARGEST, MOST_EPISODES
+from mpgrasp.command_line import LARGEST, MOST_EPISODES, MOST_UNTIL_CI
 from mpgrasp.detectors.runtimes import RUNTIMES
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.settings.sharing import MethodSettings
@@ -92,7 +92,7 @@ class Plan:
     On a ladder, those of each method on all rungs together."""
     until_ci: float | None = None
     """Batches are added until the 95 % interval of every cell is narrower than this [percentage points]."""
-    max_episodes: int = 1000
+    max_episodes: int = MOST_UNTIL_CI
     """With `until_ci`: no cell gets more episodes than this."""
     seed: int = 0
     camera: str = "auto"

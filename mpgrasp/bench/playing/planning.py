@@ -15,6 +15,7 @@ from mpgrasp.bench.playing.plan import Plan, Shard, every_method
 from mpgrasp.bench.playing.programme import PROGRAMMES, load_suites
 from mpgrasp.bench.playing.sweep import Layout, lay_out
 from mpgrasp.bench.record import Method
+from mpgrasp.command_line import MOST_UNTIL_CI
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.plugin_names import canonical, detectors_of, method_of, names_of
 from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
@@ -41,6 +42,13 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
     for option in ("density", "scale"):
         if getattr(arguments, option) is not None and not arguments.objects:
             raise ConfigError(f"--{option} without --objects", got=getattr(arguments, option))
+    used = (
+        arguments.until_ci is not None or arguments.race or arguments.resume
+    )  # of an older run it may say so
+    if arguments.max_episodes is not None and not used:
+        raise ConfigError(
+            "--max-episodes without --until-ci", got=arguments.max_episodes, allowed="--episodes"
+        )
     only_detectors: Sequence[str] = ()
     own: dict[str, Path] = {}
     if arguments.detector is not None:
@@ -96,7 +104,7 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         race=race,
         episodes=arguments.episodes if race is None else race.max_episodes,
         until_ci=arguments.until_ci,
-        max_episodes=arguments.max_episodes,
+        max_episodes=arguments.max_episodes or MOST_UNTIL_CI,
         seed=arguments.seed,
         camera=arguments.camera,
         noise=not arguments.no_noise,
@@ -123,7 +131,7 @@ def _race(arguments: argparse.Namespace, suites: Sequence[Suite]) -> tuple[RaceC
         first=str(first),
         second=str(second),
         alpha=arguments.alpha,
-        max_episodes=arguments.max_episodes,
+        max_episodes=arguments.max_episodes or MOST_UNTIL_CI,
         step=RACE_STEP,
     )
     return card, own
