@@ -19,13 +19,12 @@ import study
 
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.geometry import FloatArray
+from mpgrasp.training.claims import BINS, expected_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from single_view import Trial
 
-BINS = 10
-"""Number of bins of equal width over the claimed quality."""
 THRESHOLDS = np.linspace(0, 1, 101)
 FALSE_SHARE = 0.1
 """Largest share of false peaks among those that pass the careful threshold."""
@@ -46,16 +45,15 @@ def calibration(trials: Iterable[Trial]) -> dict[str, Any]:
     if not len(found):
         return {"n": 0, "bins": []}
     which = np.minimum((quality * BINS).astype(int), BINS - 1)
-    bins, ece = [], 0.0
+    bins = []
     for b in np.unique(which):
         inside = which == b
-        claimed, success = float(quality[inside].mean()), float(lifted[inside].mean())
-        ece += abs(claimed - success) * inside.mean()
         rate = study.rate(int(lifted[inside].sum()), int(inside.sum()))
+        claimed = float(quality[inside].mean())
         bins.append({"low": b / BINS, "high": (b + 1) / BINS, "claimed": claimed, **rate})
     return {
         "n": len(found),
-        "ece": float(ece),
+        "ece": expected_error(quality, lifted > 0),
         "brier": float(np.mean((quality - lifted) ** 2)),
         "brier_constant": float(lifted.mean() * (1 - lifted.mean())),
         "mean_quality": float(quality.mean()),

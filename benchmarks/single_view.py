@@ -14,14 +14,14 @@ import mujoco
 import numpy as np
 import study
 
-from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector, reads_truth
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp, best_pixel, peak_height
 from mpgrasp.motion.lift_trial import LiftRig
 from mpgrasp.scene.scene import Scene
-from mpgrasp.training.data.views import make_scene, stored_intrinsics, stored_pose
+from mpgrasp.training.claims import stored_frame
+from mpgrasp.training.data.views import make_scene
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.metrics import match_labels
 
@@ -85,14 +85,7 @@ def propose(
         scene, sample = dataset.scene(i), dataset.sample(i)
         if told and scene != before:
             before, truth = scene, make_scene(*scene)[0].height_map()
-        frame = DepthFrame.from_camera(
-            sample.depth,
-            rgb=sample.rgb,
-            intrinsics=stored_intrinsics(),
-            T_world_camera=stored_pose(dataset.meta[i], dataset.columns),
-            unit=1.0,
-            no_return=0.0,
-        )
+        frame = stored_frame(dataset, i)
         for name, detector in detectors.items():
             detector.reset(truth if reads_truth(detector) else None)
             found = detector.predict(frame)

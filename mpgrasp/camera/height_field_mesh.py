@@ -8,6 +8,7 @@ drawn here give the same depth, up to rounding.
 from __future__ import annotations
 
 import ctypes
+import functools
 from typing import Any
 
 import mujoco
@@ -179,6 +180,7 @@ def _hidden_below(model: mujoco.MjModel, field: int) -> frozenset[int]:
     return frozenset(np.concatenate(found).tolist())
 
 
+@functools.lru_cache(maxsize=8)
 def _corner_rays(intrinsics: CameraIntrinsics) -> FloatArray:
     """Rays (4, 3) of unit z through the corners of an image and a margin around it."""
     i = intrinsics

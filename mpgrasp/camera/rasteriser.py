@@ -266,6 +266,7 @@ def _mask_colour() -> None:
     GL.glColorMask(False, False, False, False)
 
 
+@functools.lru_cache(maxsize=8)
 def _projection(i: CameraIntrinsics) -> FloatArray:
     """Clip space (4, 4) of axes x right, y up, z backward, as MuJoCo has it: depth 1 at NEAR and 0 at FAR."""
     right, down = 1 - (2 * i.cx + 1) / i.width, 1 - (2 * i.cy + 1) / i.height

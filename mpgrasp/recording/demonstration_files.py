@@ -20,9 +20,6 @@ from mpgrasp.files.atomic import replace_file
 from mpgrasp.recording.demonstration import Demonstration
 from mpgrasp.recording.policy_view import ACTION_SCALE
 
-CONTROL_HZ = 10
-"""Control ticks a second, unless the run says otherwise."""
-
 
 class DemonstrationWriter(Protocol):
     """Writes demonstrations one after the other."""

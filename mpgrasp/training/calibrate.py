@@ -69,8 +69,13 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _refuse_known(card: Mapping[str, Any], sets: Sequence[Mapping[str, Any]]) -> None:
-    """Raise ConfigError where the network was trained or chosen on scenes of one of these sets."""
-    for known in (*card.get("data", ()), *card.get("validation_data", ())):
+    """Raise ConfigError where the network was trained or chosen, in any stage, on scenes of such a set."""
+    start = card.get("start")  # what the training went on from
+    if isinstance(start, Mapping) and isinstance(start.get("card"), Mapping):
+        _refuse_known(start["card"], sets)
+    # cards of others may say what they like: "Cornell or Jacquard"
+    lists = [told for key in ("data", "validation_data") if isinstance(told := card.get(key), list)]
+    for known in (known for told in lists for known in told if isinstance(known, Mapping)):
         for own in sets:
             if all(key in own and own[key] == known.get(key) for key in ("seed", "format")):
                 raise ConfigError(

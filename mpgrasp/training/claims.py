@@ -40,6 +40,29 @@ class Claim:
     lifted: bool
 
 
+def stored_frame(dataset: GraspDataset, index: int) -> DepthFrame:
+    """Return a view of a data set as the frame that its camera took.
+
+    Raises:
+        ConfigError: shards without the columns of the camera's pose.
+    """
+    sample = dataset.sample(index)
+    try:
+        T = stored_pose(dataset.meta[index], dataset.columns)
+    except KeyError as error:
+        raise ConfigError(
+            "shards without the camera's pose", got=dataset.columns, allowed=str(error)
+        ) from error
+    return DepthFrame.from_camera(
+        sample.depth,
+        rgb=sample.rgb,
+        intrinsics=stored_intrinsics(),
+        T_world_camera=T,
+        unit=1.0,
+        no_return=0.0,
+    )
+
+
 def claims(detector: GraspDetector, dataset: GraspDataset, images: Iterable[int]) -> Iterator[Claim]:
     """Execute the best grasp of each image; images without any are left out.
 
@@ -53,22 +76,7 @@ def claims(detector: GraspDetector, dataset: GraspDataset, images: Iterable[int]
     """
     scene, rig = None, None
     for i in images:
-        sample = dataset.sample(i)
-        try:
-            T = stored_pose(dataset.meta[i], dataset.columns)
-        except KeyError as error:
-            raise ConfigError(
-                "shards without the camera's pose", got=dataset.columns, allowed=str(error)
-            ) from error
-        frame = DepthFrame.from_camera(
-            sample.depth,
-            rgb=sample.rgb,
-            intrinsics=stored_intrinsics(),
-            T_world_camera=T,
-            unit=1.0,
-            no_return=0.0,
-        )
-        found = detector.predict(frame)
+        found = detector.predict(stored_frame(dataset, i))
         grasp = found.grasp_at(*best_pixel(found.quality))
         if not (grasp.quality > 0 and np.isfinite(grasp.position).all()):
             continue

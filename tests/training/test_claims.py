@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 from safetensors import safe_open
 from scipy.special import expit, logit
 from toy_networks import random_weights
@@ -15,6 +17,8 @@ from mpgrasp.depth import DepthFrame
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.calibration import Calibration
+from mpgrasp.detectors.networks.description import read_card
+from mpgrasp.detectors.networks.registry import default_weights
 from mpgrasp.detectors.networks.weights import load_weights, save_weights
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import Grasp, GraspMap
@@ -156,9 +160,46 @@ def test_scenes_that_the_network_was_trained_on_are_refused(
 ) -> None:
     (about,) = GraspDataset([shards], holdout=0).description()
     weights = random_weights("ggcnn2", {})
-    known = SimpleNamespace(**vars(weights))
-    known.card = {"validation_data": [{"seed": about["seed"], "format": about["format"]}]}
-    save_weights(tmp_path / "w.safetensors", known)  # type: ignore[arg-type]
+    card = {"validation_data": [{"seed": about["seed"], "format": about["format"]}]}
+    save_weights(tmp_path / "w.safetensors", replace(weights, card=card))
     command = ["calibrate", "ggcnn2", "--weights", str(tmp_path / "w.safetensors"), "--data", str(shards)]
     assert main(command) == 2
     assert "trained or chosen on" in capsys.readouterr().err
+
+
+def test_the_documented_calibrations_are_those_that_ship() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "training.md").read_text(encoding="utf-8")
+    table = text.split("## What a claim is worth")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)` \| (.+) \|$", table, re.MULTILINE)
+    assert [name for name, _ in rows] == ["dhrnet", "ggcnn2", "tfgrasp", "ggcnn"]
+    for name, cells in rows:
+        told = read_card(default_weights(name))
+        figures = told["card"]["calibration"]
+        found = [*told["calibration"].values(), figures["ece_claimed"], figures["ece_calibrated"]]
+        assert [f"{number:.2f}" for number in found] == cells.split(" | ")[:4]
+
+
+def test_scenes_of_an_earlier_stage_of_the_training_are_refused(
+    shards: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (about,) = GraspDataset([shards], holdout=0).description()
+    first = {"data": [{"seed": about["seed"], "format": about["format"]}]}
+    known = replace(random_weights("ggcnn2", {}), card={"start": {"card": first}})
+    save_weights(tmp_path / "w.safetensors", known)
+    command = ["calibrate", "ggcnn2", "--weights", str(tmp_path / "w.safetensors"), "--data", str(shards)]
+    assert main(command) == 2
+    assert "trained or chosen on" in capsys.readouterr().err
+
+
+def test_weights_that_others_have_published_are_calibrated_too(
+    shards: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        measuring, "claims", lambda *_: iter(outcomes(Calibration(slope=1.0, shift=0.5), 500))
+    )
+    torch.save(random_weights("ggcnn2", {}).network.state_dict(), tmp_path / "published.pt")
+    command = ["calibrate", "ggcnn2", "--weights", str(tmp_path / "published.pt"), "--data", str(shards)]
+    assert main([*command, "--out", str(tmp_path / "out.safetensors")]) == 0
+    back = load_weights("ggcnn2", tmp_path / "out.safetensors")
+    assert back.calibration is not None
+    assert back.width_px == 150.0

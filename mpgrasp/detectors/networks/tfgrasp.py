@@ -21,14 +21,8 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.depth import NETWORK_SIZE
-from mpgrasp.detectors.networks.declaration import (
-    HEADS,
-    MAX_CHANNELS,
-    MAX_REPEATS,
-    NetworkDeclaration,
-    PublishedWeights,
-)
-from mpgrasp.detectors.networks.tfgrasp_published import read_published
+from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, MAX_REPEATS, NetworkDeclaration
+from mpgrasp.detectors.networks.tfgrasp_published import PUBLISHED
 from mpgrasp.exceptions import ConfigError
 
 Activation = Literal["gelu", "relu"]
@@ -297,15 +291,6 @@ DECLARATIONS = {
         network=TFGrasp,
         config=TFGraspConfig,
         source="[TF-Grasp](https://arxiv.org/abs/2202.11911)",
-        published=PublishedWeights(
-            entry="patch_embed.proj.weight",
-            width_px=150.0,
-            read=read_published,
-            card={
-                "data": "Cornell or Jacquard",
-                "source": "https://github.com/WangShaoSUN/grasp-transformer",
-                "licence": "none given",
-            },
-        ),
+        published=PUBLISHED,
     ),
 }

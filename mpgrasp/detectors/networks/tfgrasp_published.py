@@ -12,6 +12,8 @@ from typing import Any
 
 from torch import Tensor
 
+from mpgrasp.detectors.networks.declaration import PublishedWeights
+
 _BLOCK = {
     "attn.relative_position_bias_table": "attention.bias",
     "attn.qkv": "attention.qkv",
@@ -88,3 +90,15 @@ def _laid_out(name: str, value: Tensor) -> Tensor:
         parts = value.reshape(*value.shape[:-1], 4, -1)
         return parts[..., list(_MERGED), :].reshape(value.shape)
     return value
+
+
+PUBLISHED = PublishedWeights(
+    entry="patch_embed.proj.weight",
+    width_px=150.0,
+    read=read_published,
+    card={
+        "data": "Cornell or Jacquard",
+        "source": "https://github.com/WangShaoSUN/grasp-transformer",
+        "licence": "none given",
+    },
+)
