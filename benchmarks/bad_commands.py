@@ -95,7 +95,7 @@ _LINES: tuple[tuple[str, str], ...] = (
     # what plays
     ("bench", f"{_REQUIRED}SUITE"),
     ("bench ''", "unknown suite; got ''"),
-    ("bench thick", "unknown suite; got 'thick'; allowed: pile, single, stacked"),
+    ("bench thick", "unknown suite; got 'thick'; allowed: find_pile, find_stick, pile"),
     ("bench plan", f"{_REQUIRED}SUITE"),
     ("bench plan thin --out x", "plan with --out"),
     ("bench profile thin --runtime magic", "unknown runtime; got 'magic'"),
@@ -151,6 +151,7 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("bench thin --controller ''", "unknown controller; got ''; allowed: mppc"),
     ("bench thin --controller pid", "unknown controller; got 'pid'"),
     ("bench thin --controller mppc,mppc", "unusable list of controllers; got 'mppc,mppc'"),
+    ("bench thin --controller sb3:none.zip", "no such file of a policy; got 'none.zip'"),
     ("bench thin --controller no_such_module:Pid", "cannot be imported (ModuleNotFoundError"),
     ("bench thin --camera eye", "unknown camera backend; got 'eye'; allowed: auto, gl, ray"),
     ("bench thin --runtime abacus", "unknown runtime; got 'abacus'; allowed: auto, torch, openvino"),

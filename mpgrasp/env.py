@@ -19,22 +19,30 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
-from mpgrasp.camera.rasteriser import FAR
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.controllers.controller import Command
 from mpgrasp.controllers.mppc import Mppc
-from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.env_ids import register
+from mpgrasp.env_spaces import OBSERVATIONS, space_of
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import Episode
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.files.settings import refuse_unknown
+from mpgrasp.grasp import Grasp
 from mpgrasp.plugin_names import canonical
 from mpgrasp.plugins import check_name, detector_names, load_detector
 from mpgrasp.recording.policy_view import ACTION_SCALE as ACTION_SCALE
-from mpgrasp.recording.policy_view import Observed, action_of, observed, observed_depth, twist_of
+from mpgrasp.recording.policy_view import (
+    Observed,
+    Pictured,
+    action_of,
+    observed,
+    observed_depth,
+    pictured,
+    twist_of,
+)
 from mpgrasp.recording.watcher import Watcher
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite, episode_seed, load_suite
@@ -43,9 +51,11 @@ FIRST_TRAINING_EPISODE = 2**20
 """Episodes of this number and above are drawn for training; below lie those of the benchmark."""
 
 Info = dict[str, Any]
+Seen = Observed | Pictured
+"""Observation of either kind."""
 
 
-class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
+class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     """One grasp attempt per episode, one control tick (0.1 s) per step.
 
     Action, (4,) in [-1, 1]: velocity of the tool point along world x, y, z and yaw rate, in units of
@@ -55,6 +65,8 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
     Observation, float32: `depth` (224, 224) [m], the camera's central square, 0 where there was no return;
     `quality` (224, 224), the detector's Q on the same pixels; `tcp` (3,) world position [m]; `yaw` (1,) of
     the tcp's x axis [rad]; `time` (1,) since the start [s]. The last is the view before the grasp.
+    With `observations="images"`, as learners with convolutions take them: `image` (2, 84, 84) of bytes and
+    `state` (6,), see `mpgrasp.recording.policy_view.Pictured`.
 
     Reward: 1 for an object lifted, held and shaken, else 0. Every episode ends as terminated: a protective
     stop or `max_reach_time`, which the policy sees coming in `time`, is a failure like any other.
@@ -77,6 +89,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
         render_mode: None, "rgb_array" (a view of the whole scene) or "depth_array" (`depth` as seen last).
+        observations: one of `OBSERVATIONS`.
 
     Raises:
         ConfigError: a suite, name or setting that cannot be used.
@@ -94,7 +107,10 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         config: EpisodeConfig | None = None,
         controller: ReachConfig | None = None,
         render_mode: str | None = None,
+        observations: str = "arrays",
     ) -> None:
+        if observations not in OBSERVATIONS:
+            raise ConfigError("unknown kind of observations", got=observations, allowed=OBSERVATIONS)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ConfigError("unknown render mode", got=render_mode, allowed=self.metadata["render_modes"])
         self.metadata = dict(self.metadata)  # vector environments write into it
@@ -109,15 +125,10 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         start, z_min = self.config.start_height, self.mppc.config.z_min
         if start <= z_min:
             raise ConfigError("the reach would end where it begins", got=start, allowed=f"above {z_min} m")
-        image, latest = (NETWORK_SIZE, NETWORK_SIZE), self.config.max_reach_time + 2 * self.config.control_dt
+        self.observations = observations
         self.action_space = spaces.Box(-1.0, 1.0, (len(ACTION_SCALE),), np.float32)
-        self.observation_space = spaces.Dict(  # type: ignore[assignment]
-            depth=spaces.Box(0.0, FAR, image, np.float32),
-            quality=spaces.Box(0.0, 1.0, image, np.float32),
-            tcp=spaces.Box(-2.0, 2.0, (3,), np.float32),  # farther than the arm reaches
-            yaw=spaces.Box(-np.float32(np.pi), np.float32(np.pi), (1,), np.float32),
-            time=spaces.Box(0.0, latest, (1,), np.float32),
-        )
+        longest = self.config.max_reach_time + 2 * self.config.control_dt
+        self.observation_space = space_of(observations, longest)  # type: ignore[assignment]
         self._episode: Episode | None = None
         self._watcher: Watcher | None = None
         self._thread: threading.Thread | None = None
@@ -131,7 +142,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         """
         return self._make_detector()
 
-    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observed, Info]:
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Seen, Info]:
         """Set up an episode: one drawn for training, or with the option `episode` that of the benchmark.
 
         Raises:
@@ -149,10 +160,10 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
         scene, scene_seed = self.suite.scene_config(number), episode_seed(self.suite.name, 0, number)
         self._episode = Episode(scene, scene_seed, detector=self.detector, config=self.config)
         self._over = False
-        self.mppc.reset(controller_seed(scene_seed))
+        self._begin(self._episode)
         return self._look(self._episode)
 
-    def step(self, action: ArrayLike) -> tuple[Observed, float, bool, bool, Info]:
+    def step(self, action: ArrayLike) -> tuple[Seen, float, bool, bool, Info]:
         """Move for one control tick, look, and at z_min grasp.
 
         Raises:
@@ -175,10 +186,7 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
             return observed, 0.0, False, False, info
         if not interrupted:
             episode.act(self._command, {})
-        result = episode.conclude(None if interrupted else self.mppc.final_grasp())
-        info |= {"outcome": result.outcome.value, "is_success": result.success, "result": result}
-        info["reflex"] = str(result.reflex or "")
-        return observed, float(result.success), True, False, info
+        return self._end(episode, None if interrupted else self.mppc.final_grasp(), observed, info)
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture (312, 352, 3) of the scene as it is now, or the last depth, as the mode says."""
@@ -205,6 +213,19 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
                 item.close()
         self._episode = self._watcher = None
 
+    def _begin(self, episode: Episode) -> None:
+        """Start what a fresh episode is for."""
+        self.mppc.reset(controller_seed(episode.seed))
+
+    def _end(
+        self, episode: Episode, grasp: Grasp | None, observed: Seen, info: Info
+    ) -> tuple[Seen, float, bool, bool, Info]:
+        """Execute the grasp of a reach, and return what its last step gives."""
+        result = episode.conclude(grasp)
+        info |= {"outcome": result.outcome.value, "is_success": result.success, "result": result}
+        info["reflex"] = str(result.reflex or "")
+        return observed, float(result.success), True, False, info
+
     def _check_thread(self) -> None:
         """Raise ConfigError if another thread has an episode here and may go on with it."""
         owner = self._thread
@@ -215,12 +236,14 @@ class GraspEnv(gymnasium.Env[Observed, NDArray[np.float32]]):
                 allowed=f"{owner.name}, any other after close() there, or one environment for each thread",
             )
 
-    def _look(self, episode: Episode) -> tuple[Observed, Info]:
+    def _look(self, episode: Episode) -> tuple[Seen, Info]:
         view = episode.look()
         with episode.timed("control"):
             self._command = self.mppc.update(view)
         assert episode.frame is not None
-        seen = observed(episode.frame, view.grasp_map, view.T_world_tcp, view.time)
+        at = view.T_world_tcp, view.time
+        images = self.observations == "images"
+        seen: Seen = pictured(view.grasp_map, *at) if images else observed(episode.frame, view.grasp_map, *at)
         return seen, {"scene_seed": episode.seed, "mppc_action": action_of(self._command.twist)}
 
 

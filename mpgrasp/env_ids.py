@@ -15,9 +15,13 @@ SUITES = {
     "Thin2mm-v0": "thin_2mm",
     "Single-v0": "single",
     "Unseen-v0": "unseen",
-    "Clutter-v0": "pile",
+    "Pile-v0": "pile",
+    "Search-v0": "find_stick",
+    "Clutter-v0": "find_pile",
+    "Clear-v0": "stacked",
 }
-"""Suite of each environment; None: of its argument `suite`, the USB stick by default."""
+"""Suite of each environment; None: of its argument `suite`, the USB stick by default. In `Search-v0` and
+`Clutter-v0` things need not be in view from the start: who goes straight down fails in most episodes."""
 NAMESPACE = "mpgrasp"
 
 
@@ -28,6 +32,6 @@ def register() -> None:
         if f"{NAMESPACE}/{name}" not in gymnasium.registry:
             gymnasium.register(
                 id=name if inside else f"{NAMESPACE}/{name}",
-                entry_point="mpgrasp.env:GraspEnv",
+                entry_point="mpgrasp.clear_env:ClearEnv" if name == "Clear-v0" else "mpgrasp.env:GraspEnv",
                 kwargs={} if suite is None else {"suite": suite},
             )

@@ -18,6 +18,8 @@ from pathlib import Path
 
 from mpgrasp.exceptions import ConfigError
 
+SB3 = "sb3:"
+"""In front of the file of a learned policy, in the place of a controller's name (`mpgrasp.policies`)."""
 WEIGHTS = "@"
 """Between a network and a file with its weights."""
 _FILE = re.compile(r"(?P<file>.+\.py)(?::(?P<attribute>.*))?", re.DOTALL)

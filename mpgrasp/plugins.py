@@ -20,7 +20,7 @@ from mpgrasp.controllers.controller import Controller
 from mpgrasp.detectors.detector import GraspDetector
 from mpgrasp.exceptions import ConfigError, MpgraspError, WeightsError
 from mpgrasp.foreign_code import contained
-from mpgrasp.plugin_names import base_name, canonical, detectors_of
+from mpgrasp.plugin_names import SB3, base_name, canonical, detectors_of
 
 if TYPE_CHECKING:
     from mpgrasp.controllers.config import ReachConfig
@@ -58,6 +58,8 @@ def controller_names() -> tuple[str, ...]:
 def check_name(kind: str, name: str, known: Iterable[str]) -> None:
     """Raise ConfigError unless the name is in the registry, with weights perhaps, or an import path."""
     known, separator = tuple(known), ":" in name
+    if kind == "controller" and name.startswith(SB3):
+        return  # its file is looked at when it is made
     if not separator:
         if (base_name(name) if kind == "detector" else name) in known:
             return
@@ -167,6 +169,10 @@ def plug_in_class(kind: str, path: str) -> Callable[..., Any]:
         ConfigError: it cannot be imported.
     """
     check_name(kind, path, ())
+    if kind == "controller" and path.startswith(SB3):
+        from mpgrasp.policies import policy_factory
+
+        return policy_factory(path)
     module_name, _, class_name = path.partition(":")
     try:
         with contained(f"the import of a {kind} plug-in", path):

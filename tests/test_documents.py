@@ -43,7 +43,7 @@ EVERY_DOCUMENT = pytest.mark.parametrize("name", DOCUMENTS)
 EVERY_PRESENT_DOCUMENT = pytest.mark.parametrize("name", PRESENT)
 NUMBERS = {"K": "0", "N": "1", "S": "0", "W": "5", "Z": "0.5"}
 """Placeholders of numbers, each with a number to parse."""
-FREE = re.compile(r"[A-Z]+|[\w/]+\.toml|\w+:\w+|\./\w+\.py:\w+|\w+@[\w/]+\.safetensors")
+FREE = re.compile(r"[A-Z]+|[\w/]+\.toml|\w+:\w+|sb3:[\w/]+\.zip|\./\w+\.py:\w+|\w+@[\w/]+\.safetensors")
 """Names of a reader's own: to be filled in, a file, a plug-in."""
 OURS = re.compile(r"(benchmarks)\.(\w+):(\w+)")
 

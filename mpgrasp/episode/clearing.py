@@ -21,6 +21,7 @@ from mpgrasp.episode.result import ClearingResult, EpisodeResult, Pick
 from mpgrasp.episode.seeds import controller_seed
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
+from mpgrasp.grasp import Grasp
 from mpgrasp.guards.asking import ask_final_grasp
 from mpgrasp.motion.arm_driver import OnTick
 from mpgrasp.motion.reflex import Reflex
@@ -96,6 +97,7 @@ class Clearing:
         self.picks: list[Pick] = []
         self.stops: list[Reflex] = []
         self._start_time = episode.simulation.time
+        self._attempt_start = 0.0
         self._T_start, self._q_start = episode.driver.T_desired.copy(), episode.driver.q.copy()
         self._failed_at: list[FloatArray] = []
         self._blind = self._drops = 0
@@ -107,11 +109,42 @@ class Clearing:
         return self.episode.simulation.time - self._start_time
 
     def play(self) -> ClearingResult:
-        """Play attempt after attempt, to the end."""
-        while (outcome := self._ending()) is None:
-            if self.picks:
-                self.episode.begin()
-            self.picks.append(self._pick())
+        """Play attempt after attempt, to the end.
+
+        Whoever steers by other means calls `begin` and `take` in turn, until there is an `ending`.
+        """
+        while (outcome := self.ending()) is None:
+            self.begin()
+            self.take(reach(self.episode, self.controller))
+        return self.conclude(outcome)
+
+    def begin(self) -> None:
+        """Start an attempt: the controller anew, and told where grasps have failed."""
+        if self.picks:
+            self.episode.begin()
+        self._attempt_start = self.time
+        self.controller.reset(controller_seed(self.episode.seed, len(self.picks)))
+        remember_failures(self.controller, self._failed_at)
+
+    def take(self, grasp: Grasp | None) -> Pick:
+        """End the attempt: execute its grasp, unless it was interrupted, carry what is held, and return."""
+        episode, driver = self.episode, self.episode.driver
+        result = episode.attempt(grasp)
+        if result.success:
+            self._carry()
+            if driver.reflex is not None:
+                result = replace(result, outcome=Outcome.REFLEX, reflex=driver.reflex)
+        self._return()
+        if result.success and result.object not in self._whereabouts()[0]:
+            result = replace(result, outcome=Outcome.DROPPED)
+        self._learn(result)
+        self._tally()
+        pick = Pick(result=result, start_s=self._attempt_start, end_s=self.time)
+        self.picks.append(pick)
+        return pick
+
+    def conclude(self, outcome: Outcome) -> ClearingResult:
+        """Return what came of it, and end the recording."""
         in_basket, knocked_off, left = self._whereabouts()
         text = f"{outcome}: {len(in_basket)} in the basket, {len(left)} left, {len(knocked_off)} knocked off"
         self.episode.recorder.finish(text)
@@ -131,7 +164,8 @@ class Clearing:
             state_hash=self.episode.simulation.state_hash(),
         )
 
-    def _ending(self) -> Outcome | None:
+    def ending(self) -> Outcome | None:
+        """Return what ends the clearing, if anything does: nothing left, no time, or nothing found."""
         if self.time > self.config.time_limit:
             return Outcome.TIMEOUT
         _, knocked_off, left = self._whereabouts()
@@ -148,22 +182,6 @@ class Clearing:
             lost = position[2] < FALLEN or away > WORKSPACE_REACH
             places[0 if self.basket.holds(position) else 1 if lost else 2].append(name)
         return tuple(places[0]), tuple(places[1]), tuple(places[2])
-
-    def _pick(self) -> Pick:
-        episode, driver, start = self.episode, self.episode.driver, self.time
-        self.controller.reset(controller_seed(episode.seed, len(self.picks)))
-        remember_failures(self.controller, self._failed_at)
-        result = episode.attempt(reach(episode, self.controller))
-        if result.success:
-            self._carry()
-            if driver.reflex is not None:
-                result = replace(result, outcome=Outcome.REFLEX, reflex=driver.reflex)
-        self._return()
-        if result.success and result.object not in self._whereabouts()[0]:
-            result = replace(result, outcome=Outcome.DROPPED)
-        self._learn(result)
-        self._tally()
-        return Pick(result=result, start_s=start, end_s=self.time)
 
     def _carry(self) -> None:
         """Take what is in the hand to the basket and let go of it."""

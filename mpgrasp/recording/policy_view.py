@@ -11,6 +11,7 @@ from mpgrasp.depth import CROP, DepthFrame, crop_resize
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import GraspMap
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 ACTION_SCALE = (0.1, 0.1, 0.1, 0.5)
 """Motion that an action of 1 stands for: speed along world x, y, z [m/s], yaw rate [rad/s]. MP-PC's bounds,
@@ -22,6 +23,17 @@ Observed = dict[str, NDArray[np.float32]]
 """`depth` (224, 224) [m], the central square, 0 where there was no return; `quality` (224, 224), the
 detector's Q on the same pixels; `tcp` (3,) world position [m]; `yaw` (1,) of the tcp's x axis [rad]; `time`
 (1,) since the start [s]."""
+
+IMAGE = 84
+"""Side of the images of `pictured` [px]: that of the network that learners of policies bring."""
+RELIEF = 0.08
+"""Height over the image's median that is white in them, and depth below it that is black [m]."""
+SLOW = 30.0
+"""Time that counts 1 in the state of `pictured` [s]."""
+
+Pictured = dict[str, NDArray[np.uint8] | NDArray[np.float32]]
+"""`image` (2, 84, 84), 0 to 255: heights about the image's median, and the detector's Q; `state` (6,): the
+tool's x, y from the workspace's centre and z [m], sine and cosine of its yaw, time in units of `SLOW`."""
 
 
 def observed(frame: DepthFrame, grasp_map: GraspMap, T_world_tcp: FloatArray, time: float) -> Observed:
@@ -48,6 +60,29 @@ def observed_depth(frame: DepthFrame) -> tuple[DepthFrame, NDArray[np.float32]]:
     """Return the central square of a frame, and its depth as it is observed."""
     image = crop_resize(frame, min(CROP, *frame.depth.shape))
     return image, np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32)
+
+
+def pictured(grasp_map: GraspMap, T_world_tcp: FloatArray, time: float) -> Pictured:
+    """Return the same as images of bytes and a short vector, made of the detector's map alone.
+
+    Args:
+        grasp_map: of this tick.
+        T_world_tcp: pose (4, 4) of the tool point.
+        time: since the start [s].
+    """
+    depth = grasp_map.depth
+    known = np.isfinite(depth)
+    middle = np.float32(np.median(depth[known])) if known.any() else np.float32(0)
+    heights = np.where(known, middle - depth, 0).astype(np.float32)
+    planes = (0.5 + 0.5 * heights / RELIEF, np.nan_to_num(grasp_map.quality))
+    image = [cv2.resize(plane, (IMAGE, IMAGE), interpolation=cv2.INTER_AREA) for plane in planes]
+    T = T_world_tcp
+    yaw = np.arctan2(T[1, 0], T[0, 0])
+    place = T[:3, 3] - (*WORKSPACE_CENTRE, 0.0)
+    return {
+        "image": np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8),
+        "state": np.clip([*place, np.sin(yaw), np.cos(yaw), time / SLOW], -2, 2).astype(np.float32),
+    }
 
 
 def action_of(twist: FloatArray) -> NDArray[np.float32]:

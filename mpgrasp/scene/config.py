@@ -34,6 +34,8 @@ class SceneConfig:
     """Dropped as meant to stand or lie, or in any orientation; yaw is always random."""
     centre: tuple[float, float] = WORKSPACE_CENTRE
     """World x, y of the placing region [m]."""
+    centre_spread: float = 0.0
+    """Half the edge of the square about it in which the region's own centre is drawn [m]; 0 = it is fixed."""
     half_extent: float = 0.10
     """Half the edge of the placing region [m]."""
     cloth_unevenness: float = 0.0006
@@ -72,6 +74,7 @@ class SceneConfig:
         _one_of("pose", self.pose, ("upright", "random"))
         if len(self.centre) != 2 or not np.isfinite(self.centre).all():
             raise ConfigError("unusable centre of the placing region", got=self.centre, allowed="x and y [m]")
+        _within("spread of the placing region's centre [m]", self.centre_spread, 0.0, 0.3)
         _within("half extent of the placing region [m]", self.half_extent, 0.0, 0.4)
         _within("unevenness of the cloth [m]", self.cloth_unevenness, 0.0, 0.01)
         _within("wavelength of the cloth [m]", self.cloth_wavelength, 0.04, 1.0)

@@ -59,6 +59,9 @@ class Settler:
     def __post_init__(self) -> None:
         self.data = mujoco.MjData(self.model)
         self._watch = Watch(self.model, self.data)
+        self._centre = np.array(self.config.centre, float)
+        if self.config.centre_spread > 0:
+            self._centre += self.rng.uniform(-1, 1, 2) * self.config.centre_spread
         joints = [self.model.joint(f"{name}/free") for name in self.names]
         self._qpos = np.array([j.qposadr[0] for j in joints], int)
         self._dof = np.array([j.dofadr[0] for j in joints], int)
@@ -97,7 +100,7 @@ class Settler:
         mujoco.mj_resetData(self.model, self.data)
         self._dropped[:] = False
         shift = self.rng.uniform(-1, 1, (len(pattern), 3)) * [jitter[0], jitter[0], jitter[1]]
-        places = pattern + shift + [*self.config.centre, 0.0]
+        places = pattern + shift + [*self._centre, 0.0]
         set_down = np.empty((len(places), 3))
         self._park()
         for k, (x, y, yaw) in enumerate(places):
@@ -129,7 +132,7 @@ class Settler:
     def _settle(self, *, pile: bool) -> FloatArray:
         for _ in range(_ROUNDS):
             calm = self._step(_ROUND_TIME)
-            away = np.abs(self.data.qpos[self._qpos[:, None] + [0, 1]] - self.config.centre).max(axis=1)
+            away = np.abs(self.data.qpos[self._qpos[:, None] + [0, 1]] - self._centre).max(axis=1)
             stray = (away > self.config.half_extent + REGION_TOLERANCE) | ~self._still()
             if calm and not stray.any():
                 return self._poses()
@@ -173,16 +176,16 @@ class Settler:
 
     def _pile_spot(self) -> FloatArray:
         offset = np.clip(self.rng.normal(0.0, 0.3, 2), -1, 1)
-        return np.array(self.config.centre) + offset * self.config.half_extent
+        return self._centre + offset * self.config.half_extent
 
     def _free_spot(self, k: int) -> FloatArray:
         """Position (2,) whose footprint overlaps no other; the roomiest of those tried where all overlap."""
         points = self.objects[k].points
         radius = np.linalg.norm(points[:, :2] if self.config.pose == "upright" else points, axis=1).max()
         others = self.data.qpos[self._qpos[self._dropped][:, None] + [0, 1]]
-        best, room = np.array(self.config.centre), -np.inf
+        best, room = self._centre, -np.inf
         for _ in range(_TRIES):
-            spot = np.array(self.config.centre) + self.rng.uniform(-1, 1, 2) * self.config.half_extent
+            spot = self._centre + self.rng.uniform(-1, 1, 2) * self.config.half_extent
             gaps = np.linalg.norm(others - spot, axis=1) - self._radius[self._dropped] - radius
             gap = gaps.min(initial=np.inf)
             if gap > room:

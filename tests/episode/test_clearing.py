@@ -17,7 +17,7 @@ from mpgrasp.detectors.oracle import OracleDetector
 from mpgrasp.episode.basket import Basket
 from mpgrasp.episode.clearing import GUIDED_RATE, Clearing, run_clearing
 from mpgrasp.episode.config import ClearingConfig, EpisodeConfig
-from mpgrasp.episode.episode import Episode
+from mpgrasp.episode.episode import Episode, reach
 from mpgrasp.episode.result import ClearingResult, EpisodeResult
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, looking_down
@@ -267,7 +267,8 @@ def test_what_is_lifted_and_lost_on_the_way_is_dropped() -> None:
     clearing = Clearing(episode, make_controller("open_loop"), QUICK)
     clearing.basket.centre = np.array([0.45, 0.25])
     clearing.basket._half = np.zeros(2)
-    pick = clearing._pick()
+    clearing.begin()
+    pick = clearing.take(reach(episode, clearing.controller))
     episode.close()
     assert pick.result.outcome is Outcome.DROPPED
     assert pick.result.object == "plank_2"

@@ -83,6 +83,20 @@ def test_objects_rest_within_the_region(config: SceneConfig, seed: int) -> None:
     assert np.abs(data.qvel).max() < 0.05
 
 
+def test_the_centre_of_the_region_is_drawn_within_its_spread_and_the_pile_lies_about_it() -> None:
+    fixed = dataclasses.replace(PILE, half_extent=0.1)
+    centres = []
+    for seed in range(6):
+        scene = build_scene(dataclasses.replace(fixed, centre_spread=0.2), seed, robot=False)
+        places = _poses(scene, scene.data())[:, :2]
+        assert np.ptp(places, axis=0).max() <= 2 * (fixed.half_extent + REGION_TOLERANCE)
+        assert np.abs(places - fixed.centre).max() <= 0.2 + fixed.half_extent + REGION_TOLERANCE
+        centres.append(places.mean(axis=0))
+    assert np.ptp(centres, axis=0).min() > 0.15
+    with pytest.raises(ConfigError, match=r"spread of the placing region's centre .*; got 0\.5"):
+        dataclasses.replace(fixed, centre_spread=0.5)
+
+
 def test_arm_stays_at_home() -> None:
     scene = build_scene(SceneConfig(), 0)
     data = scene.data()

@@ -100,8 +100,8 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--controller",
         metavar="C[,C]",
-        help=f"{', '.join(controller_names())}, or your own as module:Class (default: mppc; "
-        "paper: mvp, mppc, mvp_robust and mppc_robust)",
+        help=f"{', '.join(controller_names())}, your own as module:Class, or a policy as sb3:FILE.zip "
+        "(default: mppc; paper: mvp, mppc, mvp_robust and mppc_robust)",
     )
     add(
         "--baseline",
