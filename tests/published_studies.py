@@ -9,6 +9,7 @@ from functools import cache
 from statistics import median
 from typing import Any
 
+import numpy as np
 from published_runs import NAMES, RESULTS, Share, entry, share
 
 from mpgrasp.bench.analysis.ladder import Climb, LadderCard, climbs, comparisons
@@ -273,10 +274,13 @@ def _ladder(name: str) -> tuple[LadderCard, list[Climb]]:
 
 
 def level(detector: str, column: str) -> list[float]:
-    """Return the level of a column such as "cloth, mm, 90 %" and its interval; the last rung beyond it."""
+    """Return the level of a column such as "cloth, mm, 90 %" and its interval; the last rung beyond it.
+
+    The method is that of the detector, or of the controller, of that name.
+    """
     name, _, rate = (word.strip() for word in column.split(","))
     card, found = _ladder(name)
-    (climb,) = (c for c in found if c.method.detector == detector)
+    (climb,) = (c for c in found if detector in c.method)
     threshold = climb.thresholds[0 if rate == "90 %" else 1]
     ease, rungs = float(card.scale.ease([threshold.level])[0]), card.scale.rungs
     if not rungs[0] <= ease <= rungs[-1]:
@@ -287,13 +291,38 @@ def level(detector: str, column: str) -> list[float]:
 @cache
 def _comparisons(name: str) -> dict[tuple[str, str, float], Any]:
     card, found = _ladder(name)
-    return {(c.first.detector, c.second.detector, c.rate): c for c in comparisons(card.scale, found)}
+    by = "detector" if len({c.method.detector for c in found}) > 1 else "controller"
+    rows = comparisons(card.scale, found)
+    return {(getattr(c.first, by), getattr(c.second, by), c.rate): c for c in rows}
 
 
 def p_of_levels(ladder: str, first: str, second: str, rate: float = 0.5) -> float:
     """Return the corrected p of two detectors on a ladder."""
     found = _comparisons(ladder)
     return float((found.get((first, second, rate)) or found[second, first, rate]).p_holm)
+
+
+def difference(ladder: str, first: str, second: str, rate: float = 0.5) -> tuple[float, float, float]:
+    """Return the level of one method over that of another, or less it on a plain scale, with its interval."""
+    found = _comparisons(ladder).get((first, second, rate))
+    if found is not None:
+        return found.found.ratio, found.found.low, found.found.high
+    found = _comparisons(ladder)[second, first, rate].found
+    if _ladder(ladder)[0].scale.logarithmic:
+        return 1 / found.ratio, 1 / found.high, 1 / found.low
+    return -found.ratio, -found.high, -found.low
+
+
+def rungs_lost(first: str, second: str, method: str, rate: float = 0.5) -> float:
+    """Return by how many rungs a method's level on one ladder is easier than on one with the same rungs."""
+    (card, found), (other, others) = _ladder(first), _ladder(second)
+    assert np.array_equal(card.scale.rungs, other.scale.rungs)
+    place = 0 if rate == 0.9 else 1
+    levels = [
+        next(c for c in them if method in c.method).thresholds[place].level for them in (found, others)
+    ]
+    here, there = card.scale.ease(levels)
+    return float((here - there) / np.diff(card.scale.rungs).mean())
 
 
 def significant(ladder: str, *detectors: str) -> int:
