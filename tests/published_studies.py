@@ -318,9 +318,7 @@ def rungs_lost(first: str, second: str, method: str, rate: float = 0.5) -> float
     (card, found), (other, others) = _ladder(first), _ladder(second)
     assert np.array_equal(card.scale.rungs, other.scale.rungs)
     place = 0 if rate == 0.9 else 1
-    levels = [
-        next(c for c in them if method in c.method).thresholds[place].level for them in (found, others)
-    ]
+    levels = [next(c for c in them if method in c.method).thresholds[place].level for them in (found, others)]
     here, there = card.scale.ease(levels)
     return float((here - there) / np.diff(card.scale.rungs).mean())
 
