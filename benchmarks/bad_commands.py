@@ -244,6 +244,8 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("scene thin --out file/scene.xml", _TAKEN),
     ("scene thin --out @name", "File name too long"),
     ("detectors", f"{_REQUIRED}show|check|card"),
+    ("offline nowhere", "a file of a recording cannot be read (No such file"),
+    ("offline nowhere --controller pid", "a file of a recording cannot be read (No such file"),
     ("detectors show resnet", "unknown detector; got 'resnet'"),
     ("detectors show oracle --out picture.txt", "unknown kind of recording; got 'picture.txt'"),
     ("detectors show oracle --out file/picture.png", _TAKEN),

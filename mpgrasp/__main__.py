@@ -14,6 +14,7 @@ COMMANDS = {
     "check": "whether a detector or a controller of your own may be believed",
     "detectors": "what detectors see, how exact they are, what made them",
     "evaluate": "score detectors on Cornell, Jacquard, or images of your own",
+    "offline": "show a detector and a controller a recording of a real camera",
     "scene": "write the scene of an episode as a file",
     "training": "make training data, and train networks on them",
 }
