@@ -21,7 +21,7 @@ from mesh_writers import box, stl
 HERE = Path(__file__).resolve().parent
 RUN = HERE / "results" / "sticks-of-2mm" / "dhrnet"
 """A published run, whose first episodes become the run that commands are given."""
-PACKAGES = ("bench", "evaluate", "scene", "detectors", "training")
+PACKAGES = ("bench", "evaluate", "offline", "scene", "detectors", "training", "view")
 """Programs that are `python -m mpgrasp.PROGRAM`; the others are scripts beside this file."""
 
 
@@ -244,6 +244,9 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("scene thin --out file/scene.xml", _TAKEN),
     ("scene thin --out @name", "File name too long"),
     ("detectors", f"{_REQUIRED}show|check|card"),
+    ("view thick", "unknown suite; got 'thick'"),
+    ("view thin --out a --every nan", "unusable time between pictures; got nan; allowed: above 0"),
+    ("view thin --out a --detector nobody", "unknown detector; got 'nobody'"),
     ("offline nowhere", "a file of a recording cannot be read (No such file"),
     ("offline nowhere --controller pid", "a file of a recording cannot be read (No such file"),
     ("detectors show resnet", "unknown detector; got 'resnet'"),

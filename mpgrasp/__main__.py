@@ -16,6 +16,7 @@ COMMANDS = {
     "evaluate": "score detectors on Cornell, Jacquard, or images of your own",
     "offline": "show a detector and a controller a recording of a real camera",
     "scene": "write the scene of an episode as a file",
+    "view": "watch an episode while it is played",
     "training": "make training data, and train networks on them",
 }
 """Commands with what they are for."""

@@ -26,7 +26,7 @@ ORDER = (
     "detectors.antipodal", "detectors.networks", "detectors.runtimes", "detectors",
     "controllers", "guards", "motion", "recording", "episode",
     "suite", "brought", "plugin_names", "policies", "plugins", "settings",
-    "env_ids", "env_spaces", "env", "clear_env", "inspection", "check", "offline",
+    "env_ids", "env_spaces", "env", "clear_env", "inspection", "check", "offline", "view",
     "training.data", "training", "datasets",
     "bench.ladders",
     "bench.record", "bench.stored_lines", "bench.analysis", "bench.results", "bench.report", "bench.meshes",

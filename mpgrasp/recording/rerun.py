@@ -51,7 +51,10 @@ class RerunRecorder:
         self._stream = rr.RecordingStream("mpgrasp", recording_id=None)
         # not rerun's own file: on a full disk it waits for hours, and leaves half a recording behind
         self._bytes = rr.binary_stream(self._stream)
-        self._stream.send_blueprint(_blueprint(), make_active=False)
+        self._stream.send_blueprint(make_blueprint(), make_active=False)
+        self._begin()
+
+    def _begin(self) -> None:
         self._scene: RerunModel | None = None
         self._phase: str | None = None
         self._event: str | None = None
@@ -173,7 +176,9 @@ def _encoded(suffix: str, image: np.ndarray, settings: list[int] | None = None) 
     return blob.tobytes()
 
 
-def _blueprint() -> rrb.Blueprint:
+def make_blueprint() -> rrb.Blueprint:
+    """Return the layout of the viewer."""
+
     def image(origin: str, name: str) -> Any:
         return rrb.Spatial2DView(origin=origin, name=name)
 
