@@ -245,7 +245,7 @@ _LINES: tuple[tuple[str, str], ...] = (
     ("scene thin --out @name", "File name too long"),
     ("detectors", f"{_REQUIRED}show|check|card"),
     ("view thick", "unknown suite; got 'thick'"),
-    ("view thin --out a --every nan", "unusable time between pictures; got nan; allowed: above 0"),
+    ("view thin --out a --every nan", "argument --every: unusable number; got 'nan'"),
     ("view thin --out a --detector nobody", "unknown detector; got 'nobody'"),
     ("offline nowhere", "a file of a recording cannot be read (No such file"),
     ("offline nowhere --controller pid", "a file of a recording cannot be read (No such file"),
