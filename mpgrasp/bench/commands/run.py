@@ -135,8 +135,8 @@ def make_parser() -> argparse.ArgumentParser:
         action="extend",
         default=[],
         help="single and unseen: meshes in metres in the place of the suite's objects, one per episode in "
-        "turn: GLB, OBJ, PLY and STL files, folders of them or of folders with one object each, or ycb for "
-        "those scans of the YCB set that the hand can close on however they lie (pip install mpgrasp[ycb])",
+        "turn: GLB, OBJ, PLY, STL and URDF files, folders of them or of folders with one object each, or "
+        "ycb for those scans of the YCB set that the hand can close on however they lie (pip install mpgrasp[ycb])",
     )
     add(
         "--density",

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mpgrasp.bench.meshes.facts import FILE, NOTHING_KNOWN, ObjectFacts, read_facts
+from mpgrasp.bench.meshes.urdf import URDF, read_urdf
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.names import MAX_NAME, printable, safe_name
 
-LAYOUTS = ("textured.obj", "meshes/model.obj", "models/model_normalized.obj")
-"""Mesh of an object that has a folder of its own, as in OCRTOC, Google's scanned objects and ShapeNet."""
+LAYOUTS = ("model.urdf", "textured.obj", "meshes/model.obj", "models/model_normalized.obj")
+"""File of an object that has a folder of its own, as in OCRTOC, Google's scanned objects and ShapeNet."""
 YCB = "ycb"
 """Stands for all scans of the package; a folder of that name is `./ycb`."""
 
@@ -41,9 +42,10 @@ def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, 
     """The mesh files that the words of `--objects` stand for, each once, under different names.
 
     Args:
-        words: files, folders (all their GLB, OBJ, PLY and STL files, by name, and the one object of each
-            folder in them that has one of the `LAYOUTS`) or `ycb`.
-        scale: unit of the numbers in the files [m]; the scans are in metres.
+        words: files, folders (all their GLB, OBJ, PLY, STL and URDF files, by name, and the one object of
+            each folder in them that has one of the `LAYOUTS`) or `ycb`. Meshes that a URDF of the same folder
+            speaks of count as its own.
+        scale: unit of the numbers in the files [m]; the scans are in metres, and a URDF says it itself.
 
     Raises:
         ConfigError: a file or folder that is not there or holds no mesh, scans that are not installed, or an
@@ -70,16 +72,17 @@ def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, 
     names = _different(safe_name(_name(path)) for path in found)
     facts = _facts([path for path, strict in found.items() if not strict])
     return tuple(
-        ObjectFile(
-            name=name,
-            path=path,
-            strict=strict,
-            scale=1.0 if strict else known.scale or scale,
-            facts=known,
-        )
+        _object(name, path, facts.get(path), 1.0 if strict else scale, strict=strict)
         for name, (path, strict) in zip(names, found.items(), strict=True)
-        for known in [facts.get(path, NOTHING_KNOWN)]
     )
+
+
+def _object(name: str, path: Path, facts: ObjectFacts | None, scale: float, *, strict: bool) -> ObjectFile:
+    if path.suffix.lower() == URDF:
+        told = read_urdf(path)
+        path, scale, facts = told.mesh, told.scale, facts or told.facts
+    known = facts or NOTHING_KNOWN
+    return ObjectFile(name=name, path=path, strict=strict, scale=known.scale or scale, facts=known)
 
 
 def label(words: Sequence[str]) -> str:
@@ -100,7 +103,7 @@ def _meshes_in(folder: Path) -> list[Path]:
         raise ConfigError(
             "no mesh in folder",
             got=str(folder),
-            allowed=f"files that end in {', '.join(MESH_TYPES)}, or folders with {', '.join(LAYOUTS)}",
+            allowed=f"files of {', '.join(MESH_TYPES)}, {URDF}, or folders with {', '.join(LAYOUTS)}",
         )
     return paths
 
@@ -110,7 +113,10 @@ def _meshes_among(folder: Path) -> list[Path]:
     from mpgrasp.scene.objects.surface import MESH_TYPES
 
     inside = sorted(folder.iterdir())
-    paths = [path for path in inside if path.suffix.lower() in MESH_TYPES]
+    described = [path for path in inside if path.suffix.lower() == URDF]
+    own = {read_urdf(path).mesh.resolve() for path in described}
+    paths = [path for path in inside if path.suffix.lower() in MESH_TYPES and path.resolve() not in own]
+    paths = sorted(paths + described)
     return paths + [path for item in inside if item.is_dir() and (path := _one_object(item)) is not None]
 
 
