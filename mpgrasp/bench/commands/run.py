@@ -136,7 +136,8 @@ def make_parser() -> argparse.ArgumentParser:
         default=[],
         help="single and unseen: meshes in metres in the place of the suite's objects, one per episode in "
         "turn: GLB, OBJ, PLY, STL and URDF files, folders of them or of folders with one object each, or "
-        "ycb for those scans of the YCB set that the hand can close on however they lie (pip install mpgrasp[ycb])",
+        "ycb for those scans of the YCB set that the hand can close on however they lie (pip install "
+        "mpgrasp[ycb])",
     )
     add(
         "--density",
