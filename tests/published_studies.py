@@ -288,6 +288,11 @@ def level(detector: str, column: str) -> list[float]:
     return list(threshold)
 
 
+def controller_level(controller: str, column: str) -> list[float]:
+    """Return what `level` does, of a controller that DHRNet has played a ladder with."""
+    return level(controller.strip("`"), f"controllers-{column}")
+
+
 @cache
 def _comparisons(name: str) -> dict[tuple[str, str, float], Any]:
     card, found = _ladder(name)

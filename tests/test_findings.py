@@ -28,6 +28,8 @@ from mpgrasp.bench.results.reader import read_lines
 from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.exceptions import ConfigError
 
+pytestmark = pytest.mark.xdist_group("findings")  # one process reads the published runs, once
+
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ("README.md", "docs/results.md")
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in DOCUMENTS}

@@ -268,7 +268,7 @@ def test_getting_ready_is_counted_once_and_told(runtime: str, weights: NetworkWe
 @pytest.fixture(scope="module")
 def frames() -> list[DepthFrame]:
     """Rendered images of the benchmark's scenes, half of them with thin objects."""
-    return [*rendered_frames("thin", 20, seed=1), *rendered_frames("unseen", 20, seed=1)]
+    return [*rendered_frames("thin", 10, seed=1), *rendered_frames("unseen", 10, seed=1)]
 
 
 @pytest.mark.parametrize("runtime", ["torch", pytest.param("openvino", marks=needs_openvino)])
@@ -279,7 +279,7 @@ def test_every_runtime_finds_the_grasps_that_plain_torch_finds(
     loaded = load_weights(name)
     plain = NetworkDetector(loaded, runtime=TorchRuntime(loaded, plain=True))
     found = compare(NetworkDetector(loaded, runtime=runtime), plain, frames)
-    assert len(found.distance) == len(frames) == 40
+    assert len(found.distance) == len(frames) == 20
     assert found.share >= 0.95
 
 
