@@ -220,6 +220,17 @@ def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
     return measures[column](f"sticks-of-2mm/{name}", name, controller.strip("`"))
 
 
+def searched(controller: str, column: str) -> Any:
+    """Return a cell of the table of the searches: "stick, lifted %", "pile, protective stops" and so on."""
+    what, measure = column.split(", ", 1)
+    measures: dict[str, Callable[[str, str, str], Any]] = {
+        "lifted %": success,
+        "protective stops": stopped,
+        "time, s": lambda *method: mean_time(*method)[0],
+    }
+    return measures[measure](f"searches/find-{what}", "oracle", controller.strip("`"))
+
+
 def oracle_lifts(rung: str, column: str) -> Any:
     """Return a cell of the table of the oracle's rungs, by the folder that stands in it."""
     folder, suite = RUNGS[rung.split("`")[1]]
