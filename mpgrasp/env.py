@@ -1,7 +1,7 @@
 """The reach as a gymnasium environment: a policy steers the wrist camera, MP-PC's rule picks the grasp.
 
-Where mpgrasp is installed gymnasium knows its environments: `gymnasium.make("mpgrasp/Thin-v0")` and those
-of other suites (`mpgrasp.env_ids`). Importing this module registers them as well.
+Importing this module, or `mpgrasp.env_ids` alone, tells gymnasium the environments: then there is
+`gymnasium.make("mpgrasp/Thin-v0")`, and those of other suites.
 World, noise, arm and verdict are those of `mpgrasp.episode`: with MP-PC's own actions an episode ends as
 in the benchmark. Reference: https://gymnasium.farama.org/api/env/
 """
@@ -19,11 +19,11 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
+import mpgrasp.env_ids  # noqa: F401  # registers the environments
 from mpgrasp.controllers.config import ReachConfig
 from mpgrasp.controllers.controller import Command
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.env_ids import register
 from mpgrasp.env_spaces import OBSERVATIONS, space_of
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.episode import Episode
@@ -274,6 +274,3 @@ def _mppc_config(suite: Suite) -> ReachConfig:
     config = controller_settings(("mppc",), suite.controller)["mppc"]
     assert isinstance(config, ReachConfig)
     return config
-
-
-register()

@@ -1,6 +1,7 @@
-"""Gymnasium's names of the environments; gymnasium finds them by itself where mpgrasp is installed.
+"""Gymnasium's names of the environments, which importing this module registers.
 
 import gymnasium
+import mpgrasp.env_ids
 
 env = gymnasium.make("mpgrasp/Clutter-v0", detector="oracle")
 """
@@ -35,3 +36,6 @@ def register() -> None:
                 entry_point="mpgrasp.clear_env:ClearEnv" if name == "Clear-v0" else "mpgrasp.env:GraspEnv",
                 kwargs={} if suite is None else {"suite": suite},
             )
+
+
+register()

@@ -395,19 +395,29 @@ def test_an_environment_by_name_is_that_of_its_suite(name: str) -> None:
     env.close()
 
 
-def test_gymnasium_finds_the_environments_without_an_import_of_ours_and_loads_no_world() -> None:
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
-        "gymnasium.envs"
-    ]
-    assert declared == {NAMESPACE: "mpgrasp.env_ids:register"}
+@pytest.mark.parametrize("order", ["gymnasium, mpgrasp.env_ids", "mpgrasp.env_ids, gymnasium"])
+def test_importing_the_names_tells_gymnasium_its_environments_and_loads_no_world(order: str) -> None:
     code = (
-        "import sys, gymnasium; from gymnasium.envs.registration import namespace\n"
-        f"with namespace({NAMESPACE!r}):\n    from mpgrasp.env_ids import register; register(); register()\n"
-        "print([e for e in gymnasium.registry if 'mpgrasp' in e], {'mujoco', 'torch'} & set(sys.modules))"
+        f"import sys, {order}\n"
+        "print([e for e in gymnasium.registry if 'mpgrasp' in e], {'mujoco', 'torch'} & set(sys.modules))\n"
+        "gymnasium.make('mpgrasp/Search-v0', detector='oracle')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     names = [f"{NAMESPACE}/{name}" for name in SUITES]
     assert done.stdout.strip() == f"{names} set()", done.stderr
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_gymnasium_that_loads_plug_ins_by_itself_registers_each_once() -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    assert declared["gymnasium.envs"] == {NAMESPACE: "mpgrasp.env_ids:register"}
+    code = (
+        "import gymnasium; from gymnasium.envs.registration import namespace\n"
+        f"with namespace({NAMESPACE!r}):\n    from mpgrasp.env_ids import register; register(); register()\n"
+        "print([e for e in gymnasium.registry if 'mpgrasp' in e])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == str([f"{NAMESPACE}/{name}" for name in SUITES]), done.stderr
 
 
 def test_the_depth_that_is_rendered_is_the_depth_that_is_observed() -> None:
