@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from published_runs import NAMES, RESULTS, Share, entry, share
 
-from mpgrasp.bench.analysis.ladder import Climb, LadderCard, climbs, comparisons
+from mpgrasp.bench.analysis.ladder import Climb, LadderCard, climb, climbs, comparisons
 from mpgrasp.bench.results.reader import read_run
 from mpgrasp.bench.results.writer import RunDirectory
 from mpgrasp.bench.stored_lines import by_cell
@@ -267,10 +267,26 @@ def step_of(environment: str) -> float:
 
 @cache
 def _ladder(name: str) -> tuple[LadderCard, list[Climb]]:
+    """Return a ladder and who climbed it; "again-NAME" and "both-NAME" are seed 1, and both seeds as one."""
+    if name.startswith("both-"):
+        (card, first), (_, second) = (_ladder(name.replace("both-", other)) for other in ("", "again-"))
+        return card, [_both(card, one, two) for one in first for two in second if one.method == two.method]
     folder = RESULTS / "ladders" / name
     card = read_run(folder).configuration.ladder
     assert card is not None
     return card, climbs(card, by_cell(RunDirectory(folder).episodes()))
+
+
+def _both(card: LadderCard, first: Climb, second: Climb) -> Climb:
+    """Return two climbs of a method in other worlds as one."""
+    results = {
+        rung: {
+            **first.results.get(rung, {}),
+            **{-1 - k: won for k, won in second.results.get(rung, {}).items()},
+        }
+        for rung in {*first.results, *second.results}
+    }
+    return climb(card.scale, first.method, results)
 
 
 def level(detector: str, column: str) -> list[float]:
@@ -280,8 +296,8 @@ def level(detector: str, column: str) -> list[float]:
     """
     name, _, rate = (word.strip() for word in column.split(","))
     card, found = _ladder(name)
-    (climb,) = (c for c in found if detector in c.method)
-    threshold = climb.thresholds[0 if rate == "90 %" else 1]
+    (found_climb,) = (c for c in found if detector in c.method)
+    threshold = found_climb.thresholds[0 if rate == "90 %" else 1]
     ease, rungs = float(card.scale.ease([threshold.level])[0]), card.scale.rungs
     if not rungs[0] <= ease <= rungs[-1]:
         return [card.scale.by_ease[0 if ease < rungs[0] else -1]]
