@@ -269,8 +269,9 @@ def step_of(environment: str) -> float:
 def _ladder(name: str) -> tuple[LadderCard, list[Climb]]:
     """Return a ladder and who climbed it; "again-NAME" and "both-NAME" are seed 1, and both seeds as one."""
     if name.startswith("both-"):
-        (card, first), (_, second) = (_ladder(name.replace("both-", other)) for other in ("", "again-"))
-        return card, [_both(card, one, two) for one in first for two in second if one.method == two.method]
+        (rungs, first), (_, second) = (_ladder(name.replace("both-", other)) for other in ("", "again-"))
+        pairs = ((one, two) for one in first for two in second if one.method == two.method)
+        return rungs, [_both(rungs, one, two) for one, two in pairs]
     folder = RESULTS / "ladders" / name
     card = read_run(folder).configuration.ladder
     assert card is not None
@@ -279,13 +280,9 @@ def _ladder(name: str) -> tuple[LadderCard, list[Climb]]:
 
 def _both(card: LadderCard, first: Climb, second: Climb) -> Climb:
     """Return two climbs of a method in other worlds as one."""
-    results = {
-        rung: {
-            **first.results.get(rung, {}),
-            **{-1 - k: won for k, won in second.results.get(rung, {}).items()},
-        }
-        for rung in {*first.results, *second.results}
-    }
+    other = {rung: {-1 - k: won for k, won in of.items()} for rung, of in second.results.items()}
+    rungs = {*first.results, *other}
+    results = {rung: {**first.results.get(rung, {}), **other.get(rung, {})} for rung in rungs}
     return climb(card.scale, first.method, results)
 
 

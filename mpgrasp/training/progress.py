@@ -7,6 +7,8 @@ import time
 from collections.abc import Mapping
 from types import TracebackType
 
+from mpgrasp.training.tracking import Tracker
+
 LINE_EVERY = 30.0
 """Time between lines of a log [s]."""
 FORGET = 0.95
@@ -14,12 +16,17 @@ FORGET = 0.95
 
 
 class ProgressLog:
-    """Shows how far a training is. Use it as a context manager."""
+    """Shows how far a training is. Use it as a context manager.
 
-    def __init__(self, *, quiet: bool = False) -> None:
+    Args:
+        quiet: show nothing.
+        tracker: takes losses and results of validations too.
+    """
+
+    def __init__(self, *, quiet: bool = False, tracker: Tracker | None = None) -> None:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-        self._quiet = quiet
+        self._quiet, self._tracker = quiet, tracker
         self._terminal = sys.stderr.isatty() and not quiet
         self._bar = Progress(
             TextColumn("train"),
@@ -43,9 +50,13 @@ class ProgressLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._bar.stop()
+        if self._tracker is not None:
+            self._tracker.close()
 
     def update(self, progress: float, step: int, images: int, losses: Mapping[str, float]) -> None:
         """Show a step: share of the budget, steps and images so far, and the step's losses."""
+        if self._tracker is not None:
+            self._tracker.log(step, {f"loss/{name}": value for name, value in losses.items()})
         for key, value in losses.items():
             self._losses[key] = FORGET * self._losses.get(key, value) + (1 - FORGET) * value
         now = time.monotonic()
@@ -59,6 +70,12 @@ class ProgressLog:
         self._bar.update(self._task, completed=progress, description=text)
         if not self._terminal:
             print(f"{100 * progress:5.1f} %  {text}", file=sys.stderr, flush=True)
+
+    def validated(self, step: int, summary: Mapping[str, float], progress: str, text: str) -> None:
+        """Show what a validation has found, and when."""
+        self.note(f"{progress} validation  {text}")
+        if self._tracker is not None:
+            self._tracker.log(step, {f"validation/{name}": value for name, value in summary.items()})
 
     def note(self, text: str) -> None:
         """Show one line that stays."""

@@ -20,8 +20,8 @@ from mpgrasp.training.trainer_config import TrainConfig
 if TYPE_CHECKING:
     from mpgrasp.training.trainer import Trainer
 
-NOT_OPTIONS = ("name", "command", "run", "default_of")
-"""Names in parsed arguments that are not options of this command."""
+NOT_OPTIONS = ("name", "command", "run", "default_of", "track")
+"""Names in parsed arguments that are not options of this command, or decide nothing."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -133,6 +133,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--seed", type=SEED, default=defaults.seed, help="of weights, order and augmentation")
     add("--threads", type=THREADS, help="threads for the network (default: all cores)")
+    add("--track", metavar="T", help="draw curves in tensorboard or wandb while it lasts, where installed")
     add("--resume", action="store_true", help="continue from the checkpoint beside the weights file")
 
 
@@ -147,8 +148,10 @@ def main(args: argparse.Namespace) -> int:
         raise ConfigError("unusable number of threads", got=args.threads, allowed="1 or more")
     import torch
 
+    from mpgrasp.files.json_values import json_value
     from mpgrasp.training.dataset import GraspDataset
     from mpgrasp.training.progress import ProgressLog
+    from mpgrasp.training.tracking import make_tracker
     from mpgrasp.training.trainer import Trainer
 
     if args.threads is not None:
@@ -163,7 +166,10 @@ def main(args: argparse.Namespace) -> int:
     trainer = Trainer(
         config, dataset, out, separate, curves=curves, command=command_line(args), start=args.start
     )
-    with ProgressLog() as log:
+    tracker = None
+    if args.track is not None:
+        tracker = make_tracker(args.track, out, json_value(config))
+    with ProgressLog(tracker=tracker) as log:
         resumed = args.resume and trainer.resume()
         log.note(
             f"{config.name}: {trainer.parameters / 1e6:.2f} M parameters, {len(dataset.training)} images of "

@@ -199,7 +199,7 @@ class Trainer:
     def _validate(self, log: ProgressLog) -> None:
         self.validated = self.progress
         summary = self.evaluate()
-        log.note(f"{100 * self.progress:.0f} % validation  " + format_summary(summary))
+        log.validated(self.step, summary, f"{100 * self.progress:.0f} %", format_summary(summary))
         # equal counts as better: of two the one that was trained longer
         if summary.get(SELECT_BY, 0.0) >= self.best.get(SELECT_BY, 0.0):
             self.best = summary
