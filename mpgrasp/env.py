@@ -44,6 +44,7 @@ from mpgrasp.recording.policy_view import (
     twist_of,
 )
 from mpgrasp.recording.watcher import Watcher
+from mpgrasp.recording.window import Window
 from mpgrasp.settings.sharing import controller_settings, detector_settings
 from mpgrasp.suite import Suite, episode_seed, load_suite
 
@@ -88,7 +89,8 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
             made at the first reset, so that it can run in the process that does that.
         config: how an episode runs; the suite's settings by default.
         controller: settings of z_min, the pool and `mppc_action`; MP-PC's with the suite's by default.
-        render_mode: None, "rgb_array" (a view of the whole scene) or "depth_array" (`depth` as seen last).
+        render_mode: None, "rgb_array" (a view of the whole scene), "depth_array" (`depth` as seen last) or
+            "human" (MuJoCo's viewer, at the pace of the episode's time; closing it interrupts).
         observations: one of `OBSERVATIONS`.
 
     Raises:
@@ -96,7 +98,7 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     """
 
     metadata = {  # noqa: RUF012
-        "render_modes": ["rgb_array", "depth_array"], "render_fps": 10,
+        "render_modes": ["rgb_array", "depth_array", "human"], "render_fps": 10,
         "autoreset_mode": AutoresetMode.DISABLED,
     }  # fmt: skip
 
@@ -131,6 +133,7 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         self.observation_space = space_of(observations, longest)  # type: ignore[assignment]
         self._episode: Episode | None = None
         self._watcher: Watcher | None = None
+        self._window: Window | None = None
         self._thread: threading.Thread | None = None
 
     @functools.cached_property
@@ -158,7 +161,10 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         if number is None:
             number = int(self.np_random.integers(FIRST_TRAINING_EPISODE, 2**31))
         scene, scene_seed = self.suite.scene_config(number), episode_seed(self.suite.name, 0, number)
-        self._episode = Episode(scene, scene_seed, detector=self.detector, config=self.config)
+        self._window = Window(lingers=False) if self.render_mode == "human" else None
+        self._episode = Episode(
+            scene, scene_seed, detector=self.detector, config=self.config, recorder=self._window
+        )
         self._over = False
         self._begin(self._episode)
         return self._look(self._episode)
@@ -190,7 +196,7 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture (312, 352, 3) of the scene as it is now, or the last depth, as the mode says."""
-        if self.render_mode is None:
+        if self.render_mode in (None, "human"):  # the window shows itself
             return None
         self._check_thread()
         if self._episode is None:
@@ -208,10 +214,10 @@ class GraspEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         """
         self._check_thread()
         self._thread = None
-        for item in (self._episode, self._watcher):
+        for item in (self._episode, self._watcher, self._window):
             if item is not None:
                 item.close()
-        self._episode = self._watcher = None
+        self._episode = self._watcher = self._window = None
 
     def _begin(self, episode: Episode) -> None:
         """Start what a fresh episode is for."""

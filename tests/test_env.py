@@ -106,7 +106,23 @@ def play(env: GraspEnv, action: np.ndarray | None = None, most: int = 300) -> tu
     raise AssertionError(f"no end in {most} steps")
 
 
-def test_gymnasium_has_nothing_to_complain_about() -> None:
+class Viewer:
+    """Stands for MuJoCo's, and notes what it is asked for."""
+
+    viewport = None
+
+    def __init__(self, calls: list[str]) -> None:
+        self._calls = calls
+
+    def is_running(self) -> bool:
+        return True
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_: self._calls.append(name)
+
+
+def test_gymnasium_has_nothing_to_complain_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mpgrasp.recording.window._launch", lambda model, data: Viewer([]))
     env = gymnasium.make("mpgrasp.env:mpgrasp/Grasp-v0", render_mode="rgb_array")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -367,7 +383,11 @@ def test_unusable_settings_are_refused_by_name() -> None:
     with pytest.raises(ConfigError, match=r"above 0\.175"):
         GraspEnv(config=EpisodeConfig(start_height=0.15))
     with pytest.raises(ConfigError, match="rgb_array"):
-        GraspEnv(render_mode="human")
+        GraspEnv(render_mode="ansi")
+    with pytest.raises(
+        ConfigError, match="unknown kind of observations; got 'pixels'; allowed: arrays, images"
+    ):
+        GraspEnv(observations="pixels")
     with pytest.raises(ConfigError, match="unknown suite"):
         GraspEnv("nonsense")
 
@@ -418,6 +438,25 @@ def test_a_gymnasium_that_loads_plug_ins_by_itself_registers_each_once() -> None
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == str([f"{NAMESPACE}/{name}" for name in SUITES]), done.stderr
+
+
+def test_people_see_every_tick_in_a_window_that_closes_with_the_episode(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls: list[str] = []
+    monkeypatch.setattr("mpgrasp.recording.window._launch", lambda model, data: Viewer(calls))
+    config = EpisodeConfig(camera_backend="ray", max_reach_time=0.3)
+    env = GraspEnv(detector=Painter(), render_mode="human", config=config)
+    env.reset(options={"episode": 0})
+    over = False
+    while not over:
+        _, _, over, _, _ = env.step(STILL)
+        assert env.render() is None
+    assert calls.count("sync") == 3
+    assert calls[-1] == "close"
+    env.reset(options={"episode": 0})
+    env.close()
+    assert calls.count("close") == 2
 
 
 def test_the_depth_that_is_rendered_is_the_depth_that_is_observed() -> None:

@@ -70,9 +70,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> int:
     from mpgrasp.recording.recorder import Recorder
+    from mpgrasp.recording.window import Window, has_display
     from mpgrasp.view.pictures import Pictures
     from mpgrasp.view.play import play
-    from mpgrasp.view.window import Window, has_display
 
     out, why, pictures = options.out, "", None
     recorder: Recorder

@@ -38,7 +38,7 @@ def test_without_a_display_there_are_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mpgrasp.view.window.has_display", lambda: False)
+    monkeypatch.setattr("mpgrasp.recording.window.has_display", lambda: False)
     assert main(["thin", *QUICK, "--every", "4"]) == 0
     said = capsys.readouterr().out
     files = sorted((tmp_path / "view").iterdir())

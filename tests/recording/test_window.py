@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.recording.window import SIDE, Window, has_display
 from mpgrasp.view.play import play
-from mpgrasp.view.window import SIDE, Window, has_display
 
 
 class Viewer:

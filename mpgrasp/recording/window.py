@@ -38,6 +38,7 @@ class Window:
 
     Args:
         speed: simulated time over real time.
+        lingers: the last picture stays until the window is closed.
         launch: opens the viewer on a model and its data; MuJoCo's by default.
         sleep: waits for a time [s].
 
@@ -48,12 +49,14 @@ class Window:
     def __init__(
         self,
         speed: float = 1.0,
+        lingers: bool = True,
         launch: Callable[[Any, Any], Any] | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         if not 0 < speed < np.inf:
             raise ConfigError("unusable speed", got=speed, allowed="above 0")
-        self._speed, self._launch, self._sleep = speed, launch or _launch, sleep
+        self._speed, self._lingers = speed, lingers
+        self._launch, self._sleep = launch or _launch, sleep
         self._viewer: Any = None
         self._maps: dict[str, Picture] = {}
         self._clock = self._time = 0.0
@@ -79,11 +82,18 @@ class Window:
         self._viewer.sync()
 
     def finish(self, event: str) -> None:
-        """Leave the last picture until the window is closed."""
-        print(f"{event}; close the window to end", flush=True)
-        while self._viewer.is_running():
-            self._sleep(0.1)
-        self._viewer.close()
+        """Leave the last picture until the window is closed, if it is to linger."""
+        if self._lingers:
+            print(f"{event}; close the window to end", flush=True)
+            while self._viewer.is_running():
+                self._sleep(0.1)
+        self.close()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
 
     def _look_at_maps(self, record: TickRecord) -> None:
         if record.frame is not None:
