@@ -6,7 +6,6 @@ Every study leaves `run.json` (command, settings, versions, weights), `<study>.j
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import math
@@ -14,7 +13,6 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -40,7 +38,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
-Parser = partial(command_line.Parser, formatter_class=argparse.RawDescriptionHelpFormatter)
+Parser = command_line.Parser
 """Command line of a study; unusable arguments raise ConfigError."""
 
 

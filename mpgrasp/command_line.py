@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import os
+import re
 import sys
+import textwrap
 from collections.abc import Callable
 from ctypes.util import find_library
 from pathlib import Path
@@ -30,6 +33,45 @@ LARGEST = 2**63 - 1
 """Largest whole number of an option."""
 
 
+_TIE = "\N{NO-BREAK SPACE}"  # between an option and its value
+
+
+class HelpText(argparse.HelpFormatter):
+    """Fills paragraphs to the width of the terminal, 80 columns where there is none.
+
+    Lines that are set in keep to themselves: examples and tables. What is too long of a command goes on in
+    the next line, as a shell takes it, and no option is parted from its value.
+    """
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        lines: list[str] = []
+        for apart, group in itertools.groupby(text.splitlines(), lambda line: not line or line[0] == " "):
+            if apart:
+                for line in group:
+                    lines += _fitted(line, width)
+            else:
+                lines += textwrap.wrap(" ".join(group), width)
+        return "\n".join(indent + line for line in lines)
+
+
+def _fitted(line: str, width: int) -> list[str]:
+    """Return a line that is set in as lines of a width; a command with a backslash where it is broken."""
+    if len(line) <= width:
+        return [line]
+    margin = line[: len(line) - len(line.lstrip())]
+    command = line.lstrip().startswith("python ")
+    parts = textwrap.wrap(
+        re.sub(r"(?<= )(--?[a-z][\w-]*) (?=[^-\s])", rf"\1{_TIE}", line.strip()) if command else line.strip(),
+        width - len(margin) - 2,
+        subsequent_indent="    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    end = " \\" if command else ""
+    parts = [part.replace(_TIE, " ") for part in parts]
+    return [margin + part + (end if k + 1 < len(parts) else "") for k, part in enumerate(parts)]
+
+
 class Parser(argparse.ArgumentParser):
     """Raises ConfigError where argparse would print its usage and exit.
 
@@ -38,7 +80,7 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(**settings)
+        super().__init__(**{"formatter_class": HelpText, **settings})
         for kind, read in ((int, whole(-LARGEST, LARGEST)), (float, number(-1e12, 1e12)), (Path, _path)):
             self.register("type", kind, read)
 

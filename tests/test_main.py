@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
@@ -58,3 +59,26 @@ def test_the_module_runs_too() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "gamma" in done.stdout
+
+
+HELPS = [
+    "", "bench", *(f"bench {word}" for word in (
+        "compare", "export", "ladder", "ladders", "leaderboard", "merge", "plan", "profile", "race", "replay",
+        "report", "settings", "sweep",
+    )),
+    "check", "check detector", "check controller", "detectors", "detectors show", "detectors check",
+    "detectors card", "evaluate", "evaluate cornell", "evaluate jacquard", "evaluate synthetic", "offline",
+    "scene", "training", "training generate", "training train", "training calibrate", "view",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("words", HELPS)
+def test_every_help_fits_80_columns_and_begins_with_what_can_be_typed(
+    words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    with contextlib.suppress(SystemExit):
+        main([*words.split(), "--help"])
+    said = capsys.readouterr().out
+    assert said.startswith("usage: ")
+    assert not [line for line in said.splitlines() if len(line) > 80]

@@ -61,7 +61,6 @@ def make_parser() -> argparse.ArgumentParser:
         description="Try a detector or a controller on scenes of which the answer is known: units, "
         "directions, memory, speed. It takes seconds, and no physics.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="detector|controller")

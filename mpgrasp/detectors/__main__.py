@@ -51,7 +51,6 @@ def make_parser() -> argparse.ArgumentParser:
         prog="python -m mpgrasp.detectors",
         description="See what grasp detectors see, how exact they are, and what is known of their weights.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="show|check|card")

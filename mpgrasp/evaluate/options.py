@@ -55,7 +55,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.evaluate",
         description="Score detectors on a grasping dataset, or train them on it first.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument

@@ -43,7 +43,6 @@ def make_parser() -> argparse.ArgumentParser:
         description="Show a detector and a controller the depth images of a recording, one after the "
         "other, and print what they would do.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument

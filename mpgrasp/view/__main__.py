@@ -37,7 +37,6 @@ def make_parser() -> argparse.ArgumentParser:
         prog="python -m mpgrasp.view",
         description="Watch an episode of the benchmark while it is played.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument

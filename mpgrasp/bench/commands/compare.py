@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -47,7 +46,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench compare",
         description="Set two runs side by side, as a regression check.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("a", metavar="A", help="the reference")
     parser.add_argument("b", metavar="B", help="what is checked against it")

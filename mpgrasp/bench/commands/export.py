@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -35,7 +35,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench export",
         description="Write episodes of a run as demonstrations: a policy can be trained on them elsewhere.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("run", metavar="RUN", type=Path, help="folder of the run")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import random
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -39,7 +39,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench leaderboard",
         description="Check submitted runs and rank their methods, with intervals.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument

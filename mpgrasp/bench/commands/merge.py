@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 import shutil
 import sys
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +69,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench merge",
         description="Put the shards of a run together.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("folders", metavar="SHARD", nargs="+", type=Path, help="folder of a shard")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the whole run")

@@ -39,9 +39,8 @@ class RaceParser:
             prog=self.prog,
             description="Have two methods play the same worlds until it is known which is better.",
             epilog=_EPILOG,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
-            usage="%(prog)s A B --suite SUITE [--alpha P] [options of a run]",
+            usage="%(prog)s A B --suite SUITE [--alpha P] [options ...]",
         )
         add = self._own.add_argument
         add("--suite", metavar="SUITE", help="as for a run")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench replay",
         description="Play one episode of a run again, to look at it or to check that it repeats.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("run", metavar="RUN", type=Path, help="folder of the run")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +23,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench report",
         description="Write DIR/report.html and DIR/report.md from what runs have left.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="folder of a run, or of runs")
     parser.add_argument("--out", metavar="OUT", type=Path, help="one report of all of them, in this folder")

@@ -35,18 +35,19 @@ examples:
   python -m mpgrasp.bench sweep thin --set controller.gamma=0,4/3,8 --set controller.alpha=0.2,1
   python -m mpgrasp.bench --resume runs/thin-20260101-120000
   python -m mpgrasp.bench thin --episodes 1000 --shard 3/16 --out shards/3
-  python -m mpgrasp.bench merge shards/* --out thin-1000     (see merge --help)
-  python -m mpgrasp.bench ladder thickness --detector dhrnet,ggcnn     (see ladder and ladders --help)
-  python -m mpgrasp.bench race dhrnet/mppc ggcnn/mppc --suite thin     (see race --help)
-  python -m mpgrasp.bench plan thin --episodes 1000  (see plan --help)
-  python -m mpgrasp.bench profile thin               (see profile --help)
-  python -m mpgrasp.bench compare RUN_A RUN_B        (see compare --help)
-  python -m mpgrasp.bench replay RUN --episode 3     (see replay --help)
-  python -m mpgrasp.bench report RUN                 (see report --help)
-  python -m mpgrasp.bench export RUN --out demos     (see export --help)
-  python -m mpgrasp.bench leaderboard RUN RUN         (see leaderboard --help)
-  python -m mpgrasp.bench settings thin              (see settings --help)
-  python -m mpgrasp.bench sweep thin --set ...       (see sweep --help)
+  python -m mpgrasp.bench merge shards/* --out thin-1000
+  python -m mpgrasp.bench ladder thickness --detector dhrnet,ggcnn
+  python -m mpgrasp.bench race dhrnet/mppc ggcnn/mppc --suite thin
+  python -m mpgrasp.bench plan thin --episodes 1000
+  python -m mpgrasp.bench profile thin
+  python -m mpgrasp.bench compare RUN_A RUN_B
+  python -m mpgrasp.bench replay RUN --episode 3
+  python -m mpgrasp.bench report RUN
+  python -m mpgrasp.bench export RUN --out demos
+  python -m mpgrasp.bench leaderboard RUN RUN
+  python -m mpgrasp.bench settings thin
+
+Words such as merge, ladder, race or sweep have a help of their own: python -m mpgrasp.bench merge --help
 
 Every detector and every controller meets the same scenes, sensor noise and start poses. The same
 command gives the same episodes.jsonl again, apart from timing, whatever the number of workers. Each
@@ -79,7 +80,6 @@ def make_parser() -> argparse.ArgumentParser:
         prog="python -m mpgrasp.bench",
         description="Closed-loop grasping in simulation: play a suite, print the table, write the results.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument

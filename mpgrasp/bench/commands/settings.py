@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -43,7 +42,6 @@ def make_parser() -> Parser:
         prog="python -m mpgrasp.bench settings",
         description="Print every setting of a run with its value, its unit and its meaning.",
         epilog=_EPILOG,
-        formatter_class=RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("suite", metavar="SUITE", nargs="?", default="thin", help="as for a run (default: thin)")
