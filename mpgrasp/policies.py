@@ -13,6 +13,7 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,19 +41,21 @@ class Sb3Policy:
     Args:
         file: what `model.save(file)` wrote, of PPO, A2C, SAC, TD3 or DDPG in an environment of mpgrasp with
             `observations="images"`.
+        z_min: height of the tool at which the reach ends [m].
 
     Raises:
         ConfigError: no such file, none of those, or stable-baselines3 is not installed.
     """
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, z_min: float = MPPC.z_min) -> None:
         path = Path(file)
         if not path.is_file():
             raise ConfigError("no such file of a policy", got=file, allowed="a zip of stable-baselines3")
         self.name = f"sb3 {path.stem}"
-        self.config = {"policy": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        self.config = {"policy": path.name, "sha256": digest, "z_min": z_min}
+        self._mppc = Mppc(replace(MPPC, z_min=z_min))
         self._model = _load(path)
-        self._mppc = Mppc()
 
     def reset(self, seed: int) -> None:
         self._mppc.reset(seed)
@@ -76,11 +79,11 @@ class Sb3Policy:
         return self._mppc.diagnostics()
 
 
-def policy_factory(name: str) -> Callable[[], Sb3Policy]:
-    """Return what makes the controller of a name such as "sb3:policy.zip"."""
+def policy_factory(name: str) -> Callable[..., Sb3Policy]:
+    """Return what makes the controller of a name such as "sb3:policy.zip", with settings by keyword."""
 
-    def policy() -> Sb3Policy:
-        return Sb3Policy(name.removeprefix(SB3))
+    def policy(z_min: float = MPPC.z_min) -> Sb3Policy:
+        return Sb3Policy(name.removeprefix(SB3), z_min)
 
     return policy
 

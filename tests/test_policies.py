@@ -97,6 +97,13 @@ def test_it_keeps_what_controllers_of_a_table_to_be_cleared_are_told(policy: Pat
     assert typed.name == "sb3 downwards"
 
 
+def test_a_suite_s_height_of_the_end_is_the_policy_s(policy: Path) -> None:
+    controller: Any = load_controller(f"sb3:{policy}", {"z_min": 0.21})
+    assert controller._mppc.config.z_min == controller.config["z_min"] == 0.21
+    with pytest.raises(ConfigError, match="unusable heights"):
+        load_controller(f"sb3:{policy}", {"z_min": 0.7})
+
+
 @pytest.mark.parametrize("algorithm", [SAC, TD3])
 def test_policies_of_other_algorithms_steer_too(algorithm: Any, tmp_path: Path) -> None:
     model = algorithm("MultiInputPolicy", Spaces(*OURS), buffer_size=1, device="cpu")

@@ -70,13 +70,15 @@ def _run(options: argparse.Namespace) -> int:
     rows: list[dict[str, Any]] = []
     grasp = None
     print(f"{'file':<16}{'z':>7}{'peak':>6}  {'velocity x, y, z [m/s]':<25}best grasp so far")
-    for step in play(recording, detector, controller):
-        row, grasp = _row(step), step.grasp
-        rows.append(row)
-        speed = ", ".join(f"{row[key]:+.3f}" for key in ("vx", "vy", "vz"))
-        print(f"{row['file'][-15:]:<16}{row['z']:7.3f}{row['peak']:6.2f}  {speed:<25}{_words(grasp)}")
-    if options.out is not None:
-        _write(options.out, rows)
+    try:
+        for step in play(recording, detector, controller):
+            row, grasp = _row(step), step.grasp
+            rows.append(row)
+            speed = ", ".join(f"{row[key]:+.3f}" for key in ("vx", "vy", "vz"))
+            print(f"{row['file'][-15:]:<16}{row['z']:7.3f}{row['peak']:6.2f}  {speed:<25}{_words(grasp)}")
+    finally:  # what was found before a broken image is not lost
+        if options.out is not None and rows:
+            _write(options.out, rows)
     ending = "done" if rows[-1]["done"] else f"not done after all {len(rows)} views"
     print(f"{controller.name} is {ending}; its grasp: {_words(grasp)}")
     return 0

@@ -116,6 +116,20 @@ def test_a_recording_that_ends_too_soon_says_so(
     assert "is not done after all 2 views" in capsys.readouterr().out
 
 
+def test_what_was_found_before_a_broken_image_is_kept(
+    recorded: tuple[Path, Camera, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, camera, _ = recorded
+    with (tmp_path / POSES).open("w", newline="") as file:
+        csv.writer(file).writerows([COLUMNS, *camera.rows[:3]])
+    for name in (CAMERA, "0000.npy", "0001.npy"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    out = tmp_path / "commands.csv"
+    assert main([str(tmp_path), "--detector", "heuristic", "--out", str(out)]) == 2
+    assert "0002.npy" in capsys.readouterr().err
+    assert [row["file"] for row in csv.DictReader(out.open())] == ["0000.npy", "0001.npy"]
+
+
 def test_nobody_knows_the_truth_of_a_recording(
     recorded: tuple[Path, Camera, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
