@@ -87,11 +87,11 @@ def success(run: str, detector: str, controller: str, suite: str | None = None) 
 
 
 def robust_range(run: str) -> tuple[float, float]:
-    """Return the lowest and the highest rate of the cells of a run with a robust controller [%]."""
+    """Return the lowest and the highest rate of the networks of a run with a robust controller [%]."""
     rates = [
         100 * mean(line["success"] for line in lines.values())
-        for (_, _, controller), lines in cells(run).items()
-        if controller.endswith("_robust")
+        for (_, detector, controller), lines in cells(run).items()
+        if controller.endswith("_robust") and detector != "heuristic"
     ]
     return min(rates), max(rates)
 
@@ -167,7 +167,8 @@ def largest_p_of_pairs(run: str, detector: str, controller: str) -> float:
 def share_of_inference(run: str, detector: str, controller: str, suite: str | None = None) -> float:
     """Return the share of a control tick that the detector takes [%], of the mean times over all episodes."""
     times = [line["timing"] for line in cell(run, detector, controller, suite).values()]
-    return 100 * float(sum(t["detect"] for t in times) / sum(sum(t.values()) for t in times))
+    ticks = [sum(t for stage, t in of.items() if stage != "episode") for of in times]
+    return 100 * float(sum(t["detect"] for t in times) / sum(ticks))
 
 
 def alone(run: str, method: Method, other: Method) -> int:
@@ -181,6 +182,14 @@ def p_of_success(run: str, method: Method, other: Method) -> float:
     """Return p of McNemar's exact test."""
     ours, theirs = alone(run, method, other), alone(run, other, method)
     return float(binomtest(ours, ours + theirs, 0.5).pvalue)
+
+
+def p_in(suite: str, detector: str, controller: str, other: str) -> float:
+    """Return p of McNemar's exact test between two controllers on a suite of the paper's trials."""
+    ours, theirs = (cell("single-unseen-thin", detector, name, suite) for name in (controller, other))
+    won = sum(line["success"] and not theirs[k]["success"] for k, line in ours.items())
+    lost = sum(line["success"] and not ours[k]["success"] for k, line in theirs.items())
+    return float(binomtest(won, won + lost, 0.5).pvalue)
 
 
 def stopped(run: str, detector: str, controller: str) -> int:
