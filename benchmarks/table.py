@@ -55,9 +55,9 @@ def cells() -> dict[Cell, CellSummary]:
 def table(*, paper: bool) -> str:
     """Return the Markdown table of the paper's suites, or of all others.
 
-    That of the paper's suites, for the README, has the robust controllers with DHRNet alone, and one floor; docs/results.md
-    has all of them. A table has a row per detector and controller and a column per suite, two where tables
-    are cleared.
+    That of the paper's suites, for the README, has the robust controllers with DHRNet alone, and one floor;
+    docs/results.md has all of them. A table has a row per detector and controller and a column per suite, two
+    where tables are cleared.
     """
     rows = {
         cell: row
