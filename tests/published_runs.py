@@ -171,25 +171,17 @@ def share_of_inference(run: str, detector: str, controller: str, suite: str | No
     return 100 * float(sum(t["detect"] for t in times) / sum(ticks))
 
 
-def alone(run: str, method: Method, other: Method) -> int:
+def alone(run: str, method: Method, other: Method, suite: str | None = None) -> int:
     """Return the number of episodes in which one method succeeded and the other did not."""
-    ours, theirs = cell(run, *method), cell(run, *other)
+    ours, theirs = cell(run, *method, suite), cell(run, *other, suite)
     assert ours.keys() == theirs.keys()
     return sum(line["success"] and not theirs[k]["success"] for k, line in ours.items())
 
 
-def p_of_success(run: str, method: Method, other: Method) -> float:
+def p_of_success(run: str, method: Method, other: Method, suite: str | None = None) -> float:
     """Return p of McNemar's exact test."""
-    ours, theirs = alone(run, method, other), alone(run, other, method)
+    ours, theirs = alone(run, method, other, suite), alone(run, other, method, suite)
     return float(binomtest(ours, ours + theirs, 0.5).pvalue)
-
-
-def p_in(suite: str, detector: str, controller: str, other: str) -> float:
-    """Return p of McNemar's exact test between two controllers on a suite of the paper's trials."""
-    ours, theirs = (cell("single-unseen-thin", detector, name, suite) for name in (controller, other))
-    won = sum(line["success"] and not theirs[k]["success"] for k, line in ours.items())
-    lost = sum(line["success"] and not ours[k]["success"] for k, line in theirs.items())
-    return float(binomtest(won, won + lost, 0.5).pvalue)
 
 
 def stopped(run: str, detector: str, controller: str) -> int:

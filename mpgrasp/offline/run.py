@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from mpgrasp.controllers.controller import Command, Controller, Observation
 from mpgrasp.detectors.detector import GraspDetector
-from mpgrasp.grasp import Grasp, GraspMap, best_pixel, peak_height
+from mpgrasp.grasp import Grasp, GraspMap, peak_height
 from mpgrasp.guards.asking import ask_controller, ask_detector, ask_final_grasp
 from mpgrasp.offline.recorded import RecordedView
 
@@ -30,13 +28,6 @@ class Step:
     def peak(self) -> float:
         """Height of the peak of the quality, in [0, 1]."""
         return peak_height(self.grasp_map.quality)
-
-    @property
-    def best(self) -> Grasp | None:
-        """Best grasp of this view alone; None where nothing is claimed."""
-        quality = np.where(np.isfinite(self.grasp_map.depth), self.grasp_map.quality, -np.inf)
-        row, col = best_pixel(quality)
-        return self.grasp_map.grasp_at(row, col) if quality[row, col] > 0 else None
 
 
 def play(views: Iterable[RecordedView], detector: GraspDetector, controller: Controller) -> Iterator[Step]:

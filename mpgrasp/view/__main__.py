@@ -62,7 +62,7 @@ def make_parser() -> argparse.ArgumentParser:
         const="",
         help="stream to the rerun viewer at an address; without one, to a viewer that is started",
     )
-    add("--every", metavar="T", type=float, default=1.0, help="from a picture to the next [s] (default: 1)")
+    add("--every", metavar="T", type=float, help="from a picture to the next [s] (default: 1)")
     add("--speed", metavar="X", type=float, default=1.0, help="pace of the window's time (default: 1)")
     return parser
 
@@ -83,9 +83,11 @@ def _run(options: argparse.Namespace) -> int:
         recorder = Window(options.speed)
     else:
         out, why = (Path("view"), "no display here; ") if out is None else (out, "")
-        recorder = pictures = Pictures(out, options.every, options.camera)
+        recorder = pictures = Pictures(out, 1.0 if options.every is None else options.every, options.camera)
     if options.speed != 1 and not isinstance(recorder, Window):
         raise ConfigError("--speed without a window", got=options.speed, allowed="no --out, no --live")
+    if options.every is not None and pictures is None:
+        raise ConfigError("--every without pictures", got=options.every, allowed="with --out")
     result = play(
         options.suite, options.detector, options.controller, recorder,
         seed=options.seed, episode=options.episode, settings=options.set, camera=options.camera,

@@ -76,6 +76,14 @@ def test_bad_input_is_one_line(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_time_between_pictures_is_refused_in_a_window(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("mpgrasp.recording.window.has_display", lambda: True)
+    assert main(["thin", "--every", "2"]) == 2
+    assert "--every without pictures" in capsys.readouterr().err
+
+
 def test_a_time_between_pictures_is_above_zero(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="unusable time"):
         Pictures(tmp_path, every=float("nan"))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mpgrasp.exceptions import ConfigError
@@ -53,6 +53,14 @@ class ObjectFacts:
                 raise ConfigError(
                     "a mass and a density", got=(self.mass, self.density), allowed="one of them"
                 )
+
+    def overridden(self, by: ObjectFacts | None) -> ObjectFacts:
+        """Return these facts with others in their place where those tell something; a density ends a mass."""
+        if by is None:
+            return self
+        told = {name: value for name, value in asdict(by).items() if value is not None}
+        own = {name: None for name in ("mass", "density") if {"mass", "density"} & set(told)}
+        return replace(self, **{**own, **told})
 
 
 NOTHING_KNOWN = ObjectFacts()

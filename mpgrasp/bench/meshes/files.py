@@ -80,7 +80,7 @@ def find_objects(words: Sequence[str], scale: float = 1.0) -> tuple[ObjectFile, 
 def _object(name: str, path: Path, facts: ObjectFacts | None, scale: float, *, strict: bool) -> ObjectFile:
     if path.suffix.lower() == URDF:
         told = read_urdf(path)
-        path, scale, facts = told.mesh, told.scale, facts or told.facts
+        path, scale, facts = told.mesh, told.scale, told.facts.overridden(facts)
     known = facts or NOTHING_KNOWN
     return ObjectFile(name=name, path=path, strict=strict, scale=known.scale or scale, facts=known)
 

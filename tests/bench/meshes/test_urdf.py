@@ -53,8 +53,13 @@ def test_in_a_folder_its_mesh_is_no_object_of_its_own(tmp_path: Path) -> None:
     box(tmp_path / "mug" / "shape.stl")
     urdf(tmp_path / "mug" / "model.urdf", "package://things/mug/shape.stl")
     assert [found.name for found in find_objects([str(tmp_path)])] == ["crate", "other", "mug"]
-    (tmp_path / FILE).write_text("[mug]\nmass = 0.5\n")
-    assert [found.facts.mass for found in find_objects([str(tmp_path)])] == [0.21, None, 0.5]
+    (tmp_path / FILE).write_text("[mug]\nmass = 0.5\n[crate]\nfriction = 0.9\n")
+    facts = [found.facts for found in find_objects([str(tmp_path)])]
+    assert [known.mass for known in facts] == [0.21, None, 0.5]
+    assert [known.friction for known in facts] == [0.9, None, 0.6]
+    (tmp_path / FILE).write_text("[crate]\ndensity = 700\n")
+    crate = find_objects([str(tmp_path)])[0].facts
+    assert (crate.mass, crate.density, crate.friction) == (None, 700, 0.6)
 
 
 def test_a_mesh_of_its_package_is_found(tmp_path: Path) -> None:
