@@ -6,6 +6,7 @@ into docs/results.md. A test holds that documents and summaries say the same.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +30,7 @@ NOT_PLAYED = ""
 
 
 def cells() -> dict[Cell, CellSummary]:
-    """All published cells, as in the summaries.
+    """All published cells, as in the summaries; runs with other settings than the suite's are left out.
 
     Raises:
         ConfigError: two runs have played the same cell.
@@ -38,6 +39,8 @@ def cells() -> dict[Cell, CellSummary]:
     found: dict[Cell, CellSummary] = {}
     source: dict[Cell, Path] = {}
     for folder in sorted(path.parent for path in RESULTS.glob("*/summary.json")):
+        if _has_other_settings(folder):
+            continue
         summary = read_summary(folder)
         assert summary is not None
         assert summary.complete, f"{folder} holds an unfinished run"
@@ -50,6 +53,11 @@ def cells() -> dict[Cell, CellSummary]:
                 )
             source[row.cell], found[row.cell] = folder, row
     return found
+
+
+def _has_other_settings(folder: Path) -> bool:
+    run = folder / "run.json"
+    return run.is_file() and "--set" in json.loads(run.read_text(encoding="utf-8"))["command"].split()
 
 
 def table(*, paper: bool) -> str:
