@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from mpgrasp.exceptions import ConfigError, MpgraspError
+from mpgrasp.extras import missing_library, not_installed
 from mpgrasp.names import printable
 
 if TYPE_CHECKING:
@@ -145,8 +146,9 @@ def _path(text: str) -> Path:
 def run_command(command: Callable[[], int]) -> int:
     """Run a command and return its exit code: its own, 2 and one line for unusable input, 130 for Ctrl-C.
 
-    What the system refuses, such as a name that is too long or a full disk under standard output, is unusable
-    input too. A pipe that nobody reads any more ends it silently, with 141.
+    A library that is not installed, and what the system refuses, such as a name that is too long or a full
+    disk under standard output, are unusable input too. A pipe that nobody reads any more ends it silently,
+    with 141.
     """
     try:
         check_gl()
@@ -158,6 +160,12 @@ def run_command(command: Callable[[], int]) -> int:
         sys.stdout.flush()
     except MpgraspError as error:
         print_error(error)
+        return EXIT_BAD_INPUT
+    except ModuleNotFoundError as error:
+        library = missing_library(error)
+        if library is None:
+            raise
+        print_error(not_installed(library, "this"))
         return EXIT_BAD_INPUT
     except BrokenPipeError:  # whoever reads our output, such as `head`, has had enough
         _give_up(sys.stdout)

@@ -155,7 +155,7 @@ def test_commands_of_all_programs_are_among_these() -> None:
     assert programs >= {("-m", name) for name in modules} | {(name,) for name in studies}
     bench = {c[3] for c in COMMANDS if c[2:3] == ["mpgrasp.bench"]}
     assert bench >= {"compare", "replay", "report", "paper", *suite_names()} - {"unseen", "thin_variants"}
-    assert {c[3] for c in COMMANDS if c[2:3] == ["mpgrasp.detectors"]} == {"show", "check", "card"}
+    assert {c[3] for c in COMMANDS if c[2:3] == ["mpgrasp.detectors"]} == {"show", "check", "card", "graph"}
     assert {c[3] for c in COMMANDS if c[2:3] == ["mpgrasp.training"]} == {"calibrate", "generate", "train"}
 
 

@@ -17,7 +17,7 @@ import mpgrasp
 PACKAGE = Path(mpgrasp.__file__).parent
 
 ORDER = (
-    "exceptions", "names", "forking", "processes", "foreign_code",
+    "exceptions", "extras", "names", "forking", "processes", "foreign_code",
     "linear_algebra", "geometry", "paths", "outcome", "workspace",
     "files", "command_line", "statistics", "anytime", "thresholds", "threshold_difference",
     "readings", "depth", "height_map", "grasp",

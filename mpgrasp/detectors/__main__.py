@@ -1,4 +1,4 @@
-"""`python -m mpgrasp.detectors show|check|card`: what detectors see, how exact they are, what made them.
+"""`python -m mpgrasp.detectors show|check|card|graph`: what detectors see, and what is known of them.
 
 The subcommands are modules of `mpgrasp.inspection`: this package knows nothing of the world.
 """
@@ -23,6 +23,7 @@ examples:
   python -m mpgrasp.detectors show my_net:MyDetector --weights my_net.pt
   python -m mpgrasp.detectors check dhrnet --runtime openvino --frames 100
   python -m mpgrasp.detectors card dhrnet --weights out/dhrnet.safetensors
+  python -m mpgrasp.detectors graph dhrnet --weights out/dhrnet.safetensors
 
 exit code: 0 done, 1 the runtime finds other grasps (check), 2 unusable input, 130 interrupted (Ctrl-C).
 """
@@ -40,6 +41,8 @@ def _run(options: argparse.Namespace) -> int:
         from mpgrasp.inspection.show import run
     elif options.command == "check":
         from mpgrasp.inspection.check import run
+    elif options.command == "graph":
+        from mpgrasp.inspection.graph import run
     else:
         from mpgrasp.inspection.card import run
     return run(options)
@@ -53,7 +56,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         allow_abbrev=False,
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="show|check|card")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="show|check|card|graph")
     show = commands.add_parser(
         "show", help="draw their maps and best grasps side by side", allow_abbrev=False
     )
@@ -103,6 +106,13 @@ def make_parser() -> argparse.ArgumentParser:
     about = commands.add_parser("card", help="print the training card of weights", allow_abbrev=False)
     about.add_argument("detector", metavar="NAME", help="whose weights they are")
     about.add_argument("--weights", metavar="FILE", type=Path, help="in place of the shipped ones")
+    graph = commands.add_parser(
+        "graph", help="write a network without its weights, to use these without torch", allow_abbrev=False
+    )
+    add = graph.add_argument
+    add("detector", metavar="NAME", help="a network's name")
+    add("--weights", metavar="FILE", type=Path, help="whose settings it is for, in place of the shipped ones")
+    add("--out", metavar="FILE.graph", type=Path, help="(default: beside the weights)")
     return parser
 
 

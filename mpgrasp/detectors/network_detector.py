@@ -22,8 +22,14 @@ from mpgrasp.detectors.central_square import central_square, empty_map, says_som
 from mpgrasp.detectors.config import NetworkDetectorConfig
 from mpgrasp.detectors.networks.registry import check_network, default_weights
 from mpgrasp.detectors.runtimes import SHARED
-from mpgrasp.detectors.runtimes.compiled import CompiledNetwork, find, fingerprint, remember
-from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime
+from mpgrasp.detectors.runtimes.compiled import (
+    CompiledNetwork,
+    fingerprint,
+    of_weights,
+    remember,
+    weights_in_torch,
+    without_torch,
+)
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
@@ -96,22 +102,22 @@ class NetworkDetector:
             shared = shared_network(name, file)
             return cls(shared, config, shared.runtime)
         if isinstance(runtime, str) and runtime_name(runtime).startswith("openvino"):
-            compiled = find(name, file)
+            clock = time.perf_counter()
+            compiled = without_torch(name, file)
             if compiled is not None:
-                return cls(compiled, config, compiled.runtime)
-        from mpgrasp.detectors.networks.weights import load_weights
-
+                detector = cls(compiled, config, compiled.runtime)
+                detector._seconds = time.perf_counter() - clock
+                return detector
+        load_weights = weights_in_torch(name)
         mark = fingerprint(file)
-        read = load_weights(name, weights)
+        read = load_weights(name, file)
         return cls(read, config, runtime, mark if mark == fingerprint(file) else None)
 
     @property
     def weights(self) -> NetworkWeights:
         """The network in torch, read anew where a compiled one is used."""
         if isinstance(self._network, CompiledNetwork):
-            from mpgrasp.detectors.networks.weights import load_weights
-
-            return load_weights(self.name, self._network.weights)
+            return weights_in_torch(self.name)(self.name, self._network.weights)
         return self._network
 
     @property
@@ -141,11 +147,11 @@ class NetworkDetector:
         if self._runtime is None:
             clock = time.perf_counter()
             ready = make_runtime(self.weights, self._asked) if isinstance(self._asked, str) else self._asked
-            if self._mark is not None and isinstance(ready, OpenVinoRuntime):
-                remember(self.weights, self._mark, ready)
+            if self._mark is not None and not isinstance(self._network, CompiledNetwork):
+                remember(of_weights(self._network, ready, Path()), self._mark)
             image = self._input
             ready(np.zeros((image.channels, image.size, image.size), np.float32))
-            self._runtime, self._seconds = ready, time.perf_counter() - clock
+            self._runtime, self._seconds = ready, self._seconds + time.perf_counter() - clock
             _log.info(self.readiness)
         return self._seconds
 

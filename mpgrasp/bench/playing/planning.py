@@ -17,6 +17,7 @@ from mpgrasp.bench.playing.sweep import Layout, lay_out
 from mpgrasp.bench.record import Method
 from mpgrasp.command_line import MOST_UNTIL_CI
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.extras import check_installed
 from mpgrasp.plugin_names import canonical, detectors_of, method_of, names_of
 from mpgrasp.plugins import check_name, controller_names, detector_names, parse_weights
 from mpgrasp.settings.changes import refuse_different_methods, with_assignments
@@ -109,11 +110,19 @@ def make_plan(arguments: argparse.Namespace) -> tuple[Plan, Path]:
         camera=arguments.camera,
         noise=not arguments.no_noise,
         shard=None if arguments.shard is None else Shard.parse(arguments.shard),
-        record=arguments.record,
+        record=_recorded(arguments),
         recordings=out / "recordings",
         traces=None if arguments.no_report else out / "traces",
     )
     return plan, out
+
+
+def _recorded(arguments: argparse.Namespace) -> int:
+    """The number of episodes to record; ConfigError where they cannot be."""
+    if arguments.record:
+        check_installed("rerun", "--record")
+    record: int = arguments.record
+    return record
 
 
 def _race(arguments: argparse.Namespace, suites: Sequence[Suite]) -> tuple[RaceCard, dict[str, Path]]:
@@ -159,7 +168,7 @@ def _ladder_plan(
         seed=arguments.seed,
         camera=arguments.camera,
         noise=not arguments.no_noise,
-        record=arguments.record,
+        record=_recorded(arguments),
         recordings=out / "recordings",
         traces=None if arguments.no_report else out / "traces",
     )

@@ -12,15 +12,17 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from mpgrasp.bench.profiling.stopwatch import Stopwatch
+from mpgrasp.extras import is_installed
 
 NETWORK, IMAGE, RENDER, REST = "network", "its image, its maps", "render", "the rest"
 BEFORE, REACH, EXECUTION, AFTER = "before", "reach", "execution", "after"
 PARTS = (BEFORE, REACH, EXECUTION, AFTER)
 """Parts of an episode: up to the first tick, up to the choice of a grasp, up to its verdict, what remains."""
 
+_OF_TORCH = "mpgrasp.detectors.runtimes.torch_runtime"
 STAGES: Mapping[str, tuple[str, ...]] = {
     NETWORK: (
-        "mpgrasp.detectors.runtimes.torch_runtime:TorchRuntime.__call__",
+        f"{_OF_TORCH}:TorchRuntime.__call__",
         "mpgrasp.detectors.runtimes.openvino:OpenVinoRuntime.__call__",
         "mpgrasp.detectors.runtimes.shared:SharedRuntime.__call__",
     ),
@@ -58,6 +60,8 @@ def watched(watch: Stopwatch) -> Iterator[None]:
     with ExitStack() as stack:
         for stage, functions in STAGES.items():
             for path in functions:
+                if path.startswith(_OF_TORCH) and not is_installed("torch"):
+                    continue
                 stack.enter_context(_replaced(path, functools.partial(_timed, watch, stage)))
         for path, part in _BEGINS.items():
             stack.enter_context(_replaced(path, functools.partial(_parted, watch, part)))

@@ -88,7 +88,7 @@ def threads() -> dict[str, int | str]:
     found: dict[str, int | str] = {}
     if asked := os.environ.get("OMP_NUM_THREADS"):
         found["OMP_NUM_THREADS"] = asked
-    if "torch" in sys.modules:  # a run without networks does without it
+    if sys.modules.get("torch"):  # a run without networks does without it
         found["torch"] = sys.modules["torch"].get_num_threads()
     return found
 

@@ -35,14 +35,12 @@ _BEGINNINGS = {
 
 @dataclass(frozen=True, kw_only=True)
 class WeightsDescription:
-    """Facts that a weights file tells about itself, all of them checked."""
+    """Facts that a weights file tells about itself."""
 
     network: str
     """Name in the registry of networks."""
-    settings: Mapping[str, Any]
+    settings: Any
     """Keyword arguments of the network's config, as they were stored."""
-    config: Any
-    """That config."""
     input: NetworkInput
     width_px: float
     """Opening that a width output of 1 stands for, in pixels of the network's image [px]."""
@@ -52,8 +50,8 @@ class WeightsDescription:
     """Of the claimed quality; None where nobody has measured it."""
 
 
-def read_description(path: Path | str) -> WeightsDescription:
-    """Return the description of a weights file.
+def read_header(path: Path | str) -> WeightsDescription:
+    """Return the description of a weights file, without a look at its network: needs no torch.
 
     Raises:
         WeightsError: the file is unreadable, of another make, or says what cannot be.
@@ -74,24 +72,32 @@ def read_description(path: Path | str) -> WeightsDescription:
     )
     if not isinstance(card, dict):
         raise WeightsError(f"{path}: a training card that is no table", got=shown(card), allowed="a table")
-    try:
-        config = from_table(declaration(name).config, settings, "settings")
+    scale = _value(path, metadata, "calibration") if "calibration" in metadata else None
+    with _told_of(path):
         presented = from_table(NetworkInput, _without_range_channel(image), "input")
-        scale = _value(path, metadata, "calibration") if "calibration" in metadata else None
         calibration = None if scale is None else from_table(Calibration, scale, "calibration")
-    except ConfigError as error:
-        raise WeightsError(f"{path}: {shown(str(error), 4 * _SHOWN)}") from error
     _check_width(path, width_px, presented.size)
-    _check_sizes(path, name, config, presented)
     return WeightsDescription(
         network=name,
         settings=settings,
-        config=config,
         input=presented,
         width_px=float(width_px),
         card=card,
         calibration=calibration,
     )
+
+
+def read_description(path: Path | str) -> WeightsDescription:
+    """Return the description of a weights file, all of it checked.
+
+    Raises:
+        WeightsError: the file is unreadable, of another make, or says what cannot be.
+    """
+    about = read_header(path)
+    with _told_of(path):
+        config = from_table(declaration(about.network).config, about.settings, "settings")
+    _check_sizes(path, about.network, config, about.input)
+    return about
 
 
 def read_card(path: Path | str) -> dict[str, Any]:
@@ -112,15 +118,30 @@ def read_card(path: Path | str) -> dict[str, Any]:
     }
 
 
+def check_weights_file(file: Path) -> Path:
+    """Return the path of a weights file; WeightsError if there is none."""
+    if not file.is_file():
+        raise WeightsError("no such weights file", got=str(file), allowed="a .safetensors, .pt or .pth file")
+    return file
+
+
+def check_name(about: WeightsDescription, name: str, path: Path | str) -> None:
+    """Raise WeightsError unless weights are those of a network."""
+    if about.network != name:
+        raise WeightsError(
+            f"{path}: weights of another network, not of {name}", got=about.network, allowed=name
+        )
+
+
 @contextmanager
-def opened(path: Path | str) -> Iterator[Any]:
-    """Give a safetensors file, open.
+def opened(path: Path | str, framework: str = "np") -> Iterator[Any]:
+    """Give a safetensors file, open; its tensors are numpy's, or torch's with "pt".
 
     Raises:
         WeightsError: the file is unreadable or not safetensors.
     """
     try:
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework=framework) as file:
             yield file
     except (OSError, SafetensorError) as error:
         raise WeightsError(
@@ -132,6 +153,15 @@ def shown(value: object, most: int = _SHOWN) -> object:
     """Return a value for an error: itself, or the beginning of a long one."""
     text = value if isinstance(value, str) else repr(value)
     return value if len(text) <= most else text[:most] + "..."
+
+
+@contextmanager
+def _told_of(path: Path | str) -> Iterator[None]:
+    """Say of which file it is what a config refuses."""
+    try:
+        yield
+    except ConfigError as error:
+        raise WeightsError(f"{path}: {shown(str(error), 4 * _SHOWN)}") from error
 
 
 def _value(path: Path | str, metadata: Mapping[str, str], key: str) -> Any:

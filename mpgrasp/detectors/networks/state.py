@@ -1,34 +1,17 @@
-"""Tensors of a weights file, compared with those that its network needs before any of them is read."""
+"""Tensors of a state dict: their forms, and the forms that a network needs before any of them is read."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 
+from mpgrasp.detectors.networks.entries import Entry
 from mpgrasp.detectors.networks.registry import build_network
-from mpgrasp.exceptions import WeightsError
-
-FLOATS = ("float16", "bfloat16", "float32")
-"""Types that numbers of a network may be stored in."""
-
-_NAMED = 3  # tensors that an error names
-_SAFETENSORS = {
-    "F64": "float64", "F32": "float32", "F16": "float16", "BF16": "bfloat16", "BOOL": "bool", "U8": "uint8",
-    "I8": "int8", "I16": "int16", "I32": "int32", "I64": "int64",
-}  # fmt: skip
-
-
-class Entry(NamedTuple):
-    """Form of one tensor."""
-
-    shape: tuple[int, ...]
-    dtype: str
-    """As torch calls it, such as "float32"."""
 
 
 def entries(state: Mapping[str, Tensor]) -> dict[str, Entry]:
@@ -39,12 +22,11 @@ def entries(state: Mapping[str, Tensor]) -> dict[str, Entry]:
     }
 
 
-def stored_entries(file: Any) -> dict[str, Entry]:
-    """Return the forms of the tensors in an open safetensors file, without reading them."""
-    slices = {key: file.get_slice(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
+def numbers(state: Mapping[str, Tensor]) -> dict[str, NDArray[Any]]:
+    """Return a state dict's tensors as arrays; those of 16 bits in single precision, which is exact."""
     return {
-        key: Entry(tuple(part.get_shape()), _SAFETENSORS.get(part.get_dtype(), part.get_dtype()))
-        for key, part in slices.items()
+        key: (value.float() if value.is_floating_point() else value).detach().cpu().numpy()
+        for key, value in state.items()
     }
 
 
@@ -64,52 +46,3 @@ class _Unfilled(TorchFunctionMode):
         if getattr(func, "__module__", None) == "torch.nn.init" or func in (Tensor.normal_, Tensor.uniform_):
             return kwargs["tensor"] if "tensor" in kwargs else args[0]
         return func(*args, **kwargs)
-
-
-def check_entries(found: Mapping[str, Entry], needed: Mapping[str, Entry], path: Path | str) -> None:
-    """Raise WeightsError unless a file has the tensors that a network needs, in those shapes, as floats.
-
-    What the network counts in whole numbers is stored in the type that it counts in.
-    """
-    missing = sorted(needed.keys() - found.keys())
-    unknown = sorted(found.keys() - needed.keys())
-    if missing or unknown:
-        lists = {"missing": missing, "unexpected": unknown}
-        said = [f"{len(names)} {what}: {_some(names)}" for what, names in lists.items() if names]
-        raise WeightsError(
-            f"{path}: weights do not fit the network",
-            got="; ".join(said),
-            allowed=f"the {len(needed)} tensors of its state dict",
-        )
-    for key, entry in needed.items():
-        allowed = FLOATS if entry.dtype in FLOATS else (entry.dtype,)
-        if found[key].shape != entry.shape:
-            raise WeightsError(
-                f"{path}: weights do not fit the network, first at {key}",
-                got=found[key].shape,
-                allowed=str(entry.shape),
-            )
-        if found[key].dtype not in allowed:
-            raise WeightsError(
-                f"{path}: weights of the wrong type, first at {key}", got=found[key].dtype, allowed=allowed
-            )
-
-
-def check_numbers(state: Mapping[str, Tensor], path: Path | str) -> None:
-    """Raise WeightsError unless all numbers of a state dict are finite, and variances not below zero."""
-    for key, value in state.items():
-        if not torch.isfinite(value).all():
-            raise WeightsError(
-                f"{path}: weights that are not finite, first at {key}",
-                got="NaN or infinity",
-                allowed="numbers",
-            )
-        if key.endswith("running_var") and value.numel() and float(value.min()) < 0:
-            raise WeightsError(
-                f"{path}: a variance below zero in {key}", got=float(value.min()), allowed="0 and above"
-            )
-
-
-def _some(names: Sequence[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(name[:60] for name in names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -15,7 +15,14 @@ from torch import nn
 
 from mpgrasp.depth import NETWORK_SIZE
 from mpgrasp.detectors.networks.calibration import Calibration
-from mpgrasp.detectors.networks.description import FORMAT, opened, read_description
+from mpgrasp.detectors.networks.description import (
+    FORMAT,
+    check_name,
+    check_weights_file,
+    opened,
+    read_description,
+)
+from mpgrasp.detectors.networks.entries import check_entries, check_numbers, stored_entries
 from mpgrasp.detectors.networks.input import CHANNELS, NetworkInput
 from mpgrasp.detectors.networks.registry import (
     NETWORKS,
@@ -24,13 +31,7 @@ from mpgrasp.detectors.networks.registry import (
     declaration,
     default_weights,
 )
-from mpgrasp.detectors.networks.state import (
-    check_entries,
-    check_numbers,
-    entries,
-    needed_entries,
-    stored_entries,
-)
+from mpgrasp.detectors.networks.state import entries, needed_entries, numbers
 from mpgrasp.exceptions import ConfigError, OutputError, WeightsError
 from mpgrasp.files.json_values import json_value
 
@@ -100,8 +101,7 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
     """
     check_network(name)
     file = Path(path) if path is not None else default_weights(name)
-    if not file.is_file():
-        raise WeightsError("no such weights file", got=str(file), allowed="a .safetensors, .pt or .pth file")
+    check_weights_file(file)
     loaded = _read_published(name, file) if file.suffix in (".pt", ".pth") else _read_safetensors(name, file)
     loaded.network.eval()
     return loaded
@@ -109,15 +109,12 @@ def load_weights(name: str, path: Path | str | None = None) -> NetworkWeights:
 
 def _read_safetensors(name: str, path: Path) -> NetworkWeights:
     about = read_description(path)
-    if about.network != name:
-        raise WeightsError(
-            f"{path}: weights of another network, not of {name}", got=about.network, allowed=name
-        )
+    check_name(about, name, path)
     needed = needed_entries(name, about.settings)
-    with opened(path) as file:
+    with opened(path, "pt") as file:
         check_entries(stored_entries(file), needed, path)
         state = {key: file.get_tensor(key) for key in needed}
-    check_numbers(state, path)
+    check_numbers(numbers(state), path)
     network = build_network(name, about.settings)
     network.load_state_dict(state)
     return NetworkWeights(
@@ -172,7 +169,7 @@ def _read_published(name: str, path: Path) -> NetworkWeights:
     except ConfigError as error:
         raise WeightsError(f"{path}: {error}") from error
     check_entries(entries(state), needed, path)
-    check_numbers(state, path)
+    check_numbers(numbers(state), path)
     network = build_network(name, settings)
     network.load_state_dict(state)
     return NetworkWeights(

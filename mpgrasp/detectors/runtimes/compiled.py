@@ -1,4 +1,4 @@
-"""Networks that were checked and compiled before, found by their weights file: torch is not needed any more.
+"""Networks that are compiled without torch: from a graph, or found by their weights file as compiled before.
 
 What a weights file says and holds was checked when it was read for the first time. A note in the cache says,
 for those bytes, this code, these versions and this processor, where the compiled network is and how its image
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +18,9 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from mpgrasp.detectors.networks.calibration import Calibration
+from mpgrasp.detectors.networks.description import check_name, check_weights_file, read_header
 from mpgrasp.detectors.networks.input import NetworkInput
+from mpgrasp.detectors.runtimes.graph import find_graph, read_tensors
 from mpgrasp.detectors.runtimes.openvino import (
     OpenVinoRuntime,
     cache_folder,
@@ -27,12 +31,14 @@ from mpgrasp.detectors.runtimes.openvino import (
 )
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.extras import missing_library, not_installed
 from mpgrasp.files.cache import load_result, store_result
 
 if TYPE_CHECKING:
     from mpgrasp.detectors.networks.weights import NetworkWeights
 
 _KIND = "compiled"
+_log = logging.getLogger(__name__)
 
 
 class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -104,23 +110,68 @@ def find(name: str, weights: Path) -> CompiledNetwork | None:
     )
 
 
-def remember(weights: NetworkWeights, mark: str, runtime: OpenVinoRuntime) -> None:
-    """Have the network of a weights file found the next time.
+def of_graph(name: str, weights: Path) -> CompiledNetwork | None:
+    """Return the network of a weights file, compiled from its graph; None where it has none.
+
+    Raises:
+        WeightsError: the file is missing, unreadable or made for another network.
+    """
+    if openvino_precision() is None or weights.suffix != ".safetensors":
+        return None
+    about = read_header(check_weights_file(weights))
+    check_name(about, name, weights)
+    graph = find_graph(about, weights)
+    if graph is None:
+        return None
+    content = weights.read_bytes()
+    tensors = read_tensors(graph, content, weights)
+    if tensors is None:
+        return None
+    try:
+        runtime = OpenVinoRuntime.of_graph(graph, tensors)
+    except RuntimeError as error:  # a graph of a later version, say
+        _log.info("%s: its graph is of no use here: %s", name, error)
+        return None
+    made = CompiledNetwork(
+        name=name,
+        input=about.input,
+        width_px=about.width_px,
+        runtime=runtime,
+        weights=weights,
+        calibration=about.calibration,
+    )
+    mark = hashlib.sha256(content).hexdigest()
+    if mark == fingerprint(weights):  # what was read first, its description, was of the same file
+        remember(made, mark)
+    return made
+
+
+def remember(network: CompiledNetwork, mark: str) -> None:
+    """Have the network of a weights file found the next time, if OpenVINO compiled it and it is kept.
 
     Args:
-        weights: what was read from the file.
+        network: what was read from the file and compiled.
         mark: fingerprint of the file.
-        runtime: what was compiled.
     """
-    if runtime.file is not None:
-        scale = None if weights.calibration is None else asdict(weights.calibration)
+    runtime = network.runtime
+    if isinstance(runtime, OpenVinoRuntime) and runtime.file is not None:
         note = _Note(
-            input=asdict(weights.input),
-            width_px=weights.width_px,
+            input=asdict(network.input),
+            width_px=network.width_px,
             file=runtime.file.name,
-            calibration=scale,
+            calibration=None if network.calibration is None else asdict(network.calibration),
         )
-        store_result(_KIND, _key(weights.name, mark, runtime.settings), note)
+        store_result(_KIND, _key(network.name, mark, runtime.settings), note)
+
+
+def without_torch(name: str, weights: Path) -> CompiledNetwork | None:
+    """Return the network of a weights file as it was compiled before, or from its graph; None where it needs
+    torch.
+
+    Raises:
+        WeightsError: the file is missing, unreadable or made for another network.
+    """
+    return find(name, weights) or of_graph(name, weights)
 
 
 def made_ready(name: str, weights: Path) -> CompiledNetwork:
@@ -130,17 +181,31 @@ def made_ready(name: str, weights: Path) -> CompiledNetwork:
         ConfigError, WeightsError: it cannot be used.
     """
     if runtime_name("auto").startswith("openvino"):
-        found = find(name, weights)
+        found = without_torch(name, weights)
         if found is not None:
             return found
-    from mpgrasp.detectors.networks.weights import load_weights
-
+    load_weights = weights_in_torch(name)
     mark = fingerprint(weights)
     read = load_weights(name, weights)
-    ready = make_runtime(read)
-    if mark is not None and mark == fingerprint(weights) and isinstance(ready, OpenVinoRuntime):
-        remember(read, mark, ready)
-    return of_weights(read, ready, weights)
+    made = of_weights(read, make_runtime(read), weights)
+    if mark is not None and mark == fingerprint(weights):
+        remember(made, mark)
+    return made
+
+
+def weights_in_torch(name: str) -> Callable[[str, Path], NetworkWeights]:
+    """Return what reads weights into torch.
+
+    Raises:
+        ConfigError: there is no torch here.
+    """
+    try:
+        from mpgrasp.detectors.networks.weights import load_weights
+    except ModuleNotFoundError as error:
+        if missing_library(error) is None:
+            raise
+        raise not_installed("torch", f"{name}, as it is asked for,") from error
+    return load_weights
 
 
 def of_weights(read: NetworkWeights, runtime: Runtime, file: Path) -> CompiledNetwork:

@@ -16,7 +16,7 @@ from torch import nn
 from mpgrasp.detectors.networks.weights import NetworkWeights
 
 
-class _OneOutput(nn.Module):
+class OneOutput(nn.Module):
     """A network with its heads in one tensor (n, 4, H, W)."""
 
     def __init__(self, network: nn.Module) -> None:
@@ -30,7 +30,7 @@ class _OneOutput(nn.Module):
 def convert(weights: NetworkWeights, openvino: ModuleType) -> Any:
     """Return OpenVINO's model of the network for one image; it folds batch norms when it compiles."""
     image = shape(weights)
-    network = _OneOutput(copy.deepcopy(weights.network).cpu().float().eval())
+    network = OneOutput(copy.deepcopy(weights.network).cpu().float().eval())
     with warnings.catch_warnings(), torch.inference_mode():
         warnings.simplefilter("ignore")  # tracing warns of every shape that it takes for a constant
         return openvino.convert_model(network, example_input=torch.zeros(image), input=[image])

@@ -1,8 +1,8 @@
 """Networks in OpenVINO (https://docs.openvino.ai), compiled once and kept on disk.
 
-Converting and compiling takes seconds, reading what was compiled a fraction of one. A file in the cache is
-named after all that it was made from: weights, network code, precision, versions and processor. Reading it
-takes no torch.
+Converting from torch takes seconds, compiling a graph or reading what was compiled a fraction of one. A file
+in the cache is named after all that it was made from: weights, network code or graph, precision, versions and
+processor. Reading it takes no torch.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import logging
 import os
 import sys
+from collections.abc import Callable, Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -24,11 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpgrasp import paths
+from mpgrasp.extras import is_installed
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.forking import OPENVINO, refuse_inherited, starting
 
 if TYPE_CHECKING:
     from mpgrasp.detectors.networks.weights import NetworkWeights
+    from mpgrasp.detectors.runtimes.graph import Graph
 
 Float32 = NDArray[np.float32]
 
@@ -51,22 +54,35 @@ class OpenVinoRuntime:
     device = "cpu"
 
     def __init__(self, weights: NetworkWeights, precision: str | None = None) -> None:
-        from mpgrasp.detectors.runtimes.conversion import convert
+        from mpgrasp.detectors.runtimes.conversion import content, convert, shape
 
-        precision = precision or openvino_precision()
-        if precision is None:
-            raise ImportError("openvino cannot be imported")
-        settings = compile_settings(precision, threads())
-        file = _cache_file(weights, settings)
-        blob = _read(file)
-        cached = blob is not None
-        if blob is None:
-            model = convert(weights, _openvino())
-            blob = _core().compile_model(model, _DEVICE, settings).export_model().getvalue()
-            if not _write(file, blob):
-                file = None
-        # what was just compiled is read back too, so that the first run is like all others
-        self._load(blob, settings, cached, file)
+        about = [weights.name, dict(weights.settings), shape(weights)]
+        self._compile(
+            weights.name, about, content(weights), lambda: convert(weights, openvino()), _settings(precision)
+        )
+
+    @classmethod
+    def of_graph(
+        cls, graph: Graph, tensors: Mapping[str, NDArray[Any]], precision: str | None = None
+    ) -> OpenVinoRuntime:
+        """Return a network with these weights, compiled from its graph: the same bits, and no torch.
+
+        Args:
+            graph: of the network.
+            tensors: its weights, by name.
+            precision: "bf16" or "f32"; by default the faster one that the processor has.
+        """
+        made = cls.__new__(cls)
+        facts = graph.facts
+        numbers = (part for key in sorted(tensors) for part in (key.encode(), tensors[key].tobytes()))
+        made._compile(
+            facts.network,
+            [facts.network, facts.config, facts.image],
+            (graph.layers, graph.constants, *numbers),
+            lambda: graph.filled(tensors, openvino(), _core()),
+            _settings(precision),
+        )
+        return made
 
     @classmethod
     def of_file(cls, file: Path, settings: dict[str, Any]) -> OpenVinoRuntime | None:
@@ -77,6 +93,25 @@ class OpenVinoRuntime:
         made = cls.__new__(cls)
         made._load(blob, settings, True, file)
         return made
+
+    def _compile(
+        self,
+        name: str,
+        about: list[Any],
+        content: Iterable[bytes],
+        model: Callable[[], Any],
+        settings: dict[str, Any],
+    ) -> None:
+        """Compile a network, or read what was compiled before under the hash of all that is said of it."""
+        file = _cache_file(name, about, content, settings)
+        blob = _read(file)
+        cached = blob is not None
+        if blob is None:
+            blob = _core().compile_model(model(), _DEVICE, settings).export_model().getvalue()
+            if not _write(file, blob):
+                file = None
+        # what was just compiled is read back too, so that the first run is like all others
+        self._load(blob, settings, cached, file)
 
     def _load(self, blob: bytes, settings: dict[str, Any], cached: bool, file: Path | None) -> None:
         self.name = f"openvino {settings['INFERENCE_PRECISION_HINT']}"
@@ -114,22 +149,42 @@ def compile_settings(precision: str, count: int) -> dict[str, Any]:
 
 
 def threads() -> int:
-    """Return how many threads torch computes on; imports it only where OMP_NUM_THREADS does not say so."""
+    """Return how many threads torch computes on; imports it only where OMP_NUM_THREADS does not say so.
+
+    Without torch it is the number of processors that this process may use.
+    """
     said = os.environ.get("OMP_NUM_THREADS", "")
-    if "torch" not in sys.modules and said.isdecimal() and int(said) > 0:
+    if sys.modules.get("torch") is None and said.isdecimal() and int(said) > 0:
         return int(said)
+    if not is_installed("torch"):
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     import torch
 
     return torch.get_num_threads()
 
 
+def _settings(precision: str | None) -> dict[str, Any]:
+    """Return the settings to compile with here, by default in the faster precision."""
+    precision = precision or openvino_precision()
+    if precision is None:
+        raise ImportError("openvino cannot be imported")
+    return compile_settings(precision, threads())
+
+
 def machine() -> dict[str, Any]:
     """Return versions and processor, which decide what compiling makes."""
     return {
-        "versions": [_openvino().__version__, metadata.version("torch")],
+        "versions": [openvino().__version__, _torch_version()],
         "processor": _core().get_property(_DEVICE, "FULL_DEVICE_NAME"),
         "capabilities": sorted(_core().get_property(_DEVICE, "OPTIMIZATION_CAPABILITIES")),
     }
+
+
+def _torch_version() -> str | None:
+    try:
+        return metadata.version("torch")
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def cache_folder() -> Path | None:
@@ -145,10 +200,10 @@ def _core() -> Any:
 
 @functools.cache
 def _made_core() -> Any:
-    return _openvino().Core()
+    return openvino().Core()
 
 
-def _openvino() -> ModuleType:
+def openvino() -> ModuleType:
     """Import the library without its telemetry: who benchmarks a grasp has not agreed to report it."""
     name = "openvino_telemetry"
     if "openvino" in sys.modules:
@@ -156,30 +211,26 @@ def _openvino() -> ModuleType:
     before = sys.modules.get(name)
     sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed, which OpenVINO allows
     try:
-        openvino = importlib.import_module("openvino")
+        found = importlib.import_module("openvino")
     finally:
         if before is None:
             del sys.modules[name]
         else:
             sys.modules[name] = before
-    return openvino
+    return found
 
 
-def _cache_file(weights: NetworkWeights, settings: dict[str, Any]) -> Path | None:
-    from mpgrasp.detectors.runtimes.conversion import content, shape
-
+def _cache_file(
+    name: str, about: list[Any], content: Iterable[bytes], settings: dict[str, Any]
+) -> Path | None:
     folder = cache_folder()
     if folder is None:
         return None
-    about = {
-        **machine(),
-        "compiled": settings,
-        "network": [weights.name, dict(weights.settings), shape(weights)],
-    }
-    digest = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
-    for part in content(weights):
+    all_of_it = {**machine(), "compiled": settings, "network": about}
+    digest = hashlib.sha256(json.dumps(all_of_it, sort_keys=True, default=str).encode())
+    for part in content:
         digest.update(part)
-    return folder / f"{weights.name}-{digest.hexdigest()[:32]}.ov"
+    return folder / f"{name}-{digest.hexdigest()[:32]}.ov"
 
 
 def _read(file: Path | None) -> bytes | None:

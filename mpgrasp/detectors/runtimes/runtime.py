@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mpgrasp.detectors.runtimes import RUNTIMES, SHARED
 from mpgrasp.detectors.runtimes.openvino import OpenVinoRuntime, openvino_precision
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.extras import is_installed
 
 if TYPE_CHECKING:
     from mpgrasp.detectors.networks.weights import NetworkWeights
@@ -71,6 +72,8 @@ def runtime_name(runtime: str) -> str:
 
 def has_cuda() -> bool:
     """True if torch can compute on a GPU; imports it only where that may be."""
+    if not is_installed("torch"):
+        return False
     if "torch" not in sys.modules:
         try:
             built_without = metadata.version("torch").endswith("+cpu")

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.detectors.runtimes.compiled import fingerprint, made_ready, of_weights
+from mpgrasp.detectors.runtimes.compiled import fingerprint, made_ready, of_weights, weights_in_torch
 from mpgrasp.detectors.runtimes.runtime import has_cuda
 from mpgrasp.exceptions import ConfigError, MpgraspError
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
@@ -114,10 +114,9 @@ class _Shared:
 
     def __init__(self, name: str, weights: Path) -> None:
         if has_cuda():
-            from mpgrasp.detectors.networks.weights import load_weights
             from mpgrasp.detectors.runtimes.torch_runtime import TorchBatch
 
-            read = load_weights(name, weights)
+            read = weights_in_torch(name)(name, weights)
             self._batch: TorchBatch | None = TorchBatch(read)
             self.facts = of_weights(read, self._batch, weights)
         else:
