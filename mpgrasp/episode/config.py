@@ -38,7 +38,8 @@ class EpisodeConfig:
     within two standard deviations."""
     start_radius: float | None = None
     """Radius of a disc about the workspace's centre in which the first viewpoint lies, anywhere alike [m], as
-    in the paper's Fig. 3; none = as `start_jitter` says."""
+    in the paper's Fig. 3; none = as `start_jitter` says. A viewpoint that the arm does not reach is drawn
+    again."""
     max_reach_time: float = 20.0
     """A reach that takes longer is a timeout [s]."""
     camera_backend: str = "auto"

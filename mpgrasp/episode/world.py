@@ -13,6 +13,7 @@ from mpgrasp.camera.standing_errors import StandingErrors, calibration_error
 from mpgrasp.camera.wrist_camera import WristCamera
 from mpgrasp.episode.config import EpisodeConfig
 from mpgrasp.episode.seeds import calibration_rng, patches_rng, pattern_rng, start_rng
+from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import FloatArray, invert, looking_down
 from mpgrasp.linear_algebra import product
 from mpgrasp.motion.arm_driver import ArmDriver
@@ -22,6 +23,8 @@ from mpgrasp.scene.config import SceneConfig
 from mpgrasp.scene.scene import build_scene
 from mpgrasp.scene.simulation import Simulation
 from mpgrasp.workspace import WORKSPACE_CENTRE
+
+_DRAWS = 20  # of a start that can be reached; a region of which next to nothing can is a slip
 
 
 class World:
@@ -53,8 +56,7 @@ class World:
             colour=colour,
         )
         self.camera.errors = self._standing_errors(scene_config, seed)
-        start = np.array(WORKSPACE_CENTRE) + _start_offset(config, start_rng(seed))
-        self.put_camera_above(start, config.start_height)
+        self._put_at_start(start_rng(seed))
         self.driver = ArmDriver(
             self.simulation,
             config.motion,
@@ -79,6 +81,17 @@ class World:
             pattern=pattern,
             patches=patches,
         )
+
+    def _put_at_start(self, rng: np.random.Generator) -> None:
+        """Set the arm to its first viewpoint; one that it does not reach is drawn again."""
+        config = self._config
+        for draw in range(_DRAWS):
+            try:
+                start = np.array(WORKSPACE_CENTRE) + _start_offset(config, rng)
+                return self.put_camera_above(start, config.start_height)
+            except ConfigError:
+                if draw == _DRAWS - 1:
+                    raise
 
     def put_camera_above(self, position: ArrayLike, height: float) -> None:
         """Set the arm so that the camera looks straight down on a place; a driver is to be reset then.

@@ -11,9 +11,11 @@ from scipy.stats import kstest
 from mpgrasp.camera.config import CameraConfig
 from mpgrasp.camera.noise import DepthNoise
 from mpgrasp.episode.config import EpisodeConfig
+from mpgrasp.episode.seeds import start_rng
 from mpgrasp.episode.world import World, _start_offset
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.scene.config import SceneConfig
+from mpgrasp.workspace import WORKSPACE_CENTRE
 
 SCENE = SceneConfig(objects=("usb_stick",))
 
@@ -57,6 +59,28 @@ def test_a_start_in_a_disc_is_uniform_in_it() -> None:
     assert EpisodeConfig().start_radius is None
     with pytest.raises(ConfigError, match="start_radius"):
         EpisodeConfig(start_radius=-0.1)
+
+
+def test_a_start_that_the_arm_does_not_reach_is_drawn_again() -> None:
+    config = EpisodeConfig(camera_backend="ray", start_radius=0.5)
+    redrawn = 0
+    for seed in range(12):
+        world = World(SCENE, seed, config)
+        rng = start_rng(seed)
+        draws = [np.array(WORKSPACE_CENTRE) + _start_offset(config, rng) for _ in range(20)]
+        seen = world.camera.pose(world.simulation.data)[:2, 3]
+        world.close()
+        (taken,) = (k for k, draw in enumerate(draws) if np.allclose(draw, seen, atol=1e-4))
+        redrawn += taken > 0
+        for draw in draws[:taken]:
+            with pytest.raises(ConfigError, match="out of reach"):
+                world.put_camera_above(draw, config.start_height)
+    assert 0 < redrawn < 12
+
+
+def test_a_start_of_which_nothing_can_be_reached_is_refused() -> None:
+    with pytest.raises(ConfigError, match="out of reach"):
+        World(SCENE, 0, EpisodeConfig(camera_backend="ray", start_height=1.0))
 
 
 def test_errors_of_the_camera_are_drawn_from_the_seed_and_each_by_itself() -> None:
