@@ -14,7 +14,7 @@ from rich.table import Table
 from mpgrasp.bench.analysis.pairing import Pairing, pair, pair_worlds
 from mpgrasp.bench.analysis.tally import restricted_time
 from mpgrasp.bench.record import Cell, Cells, ClearingLine, Line
-from mpgrasp.bench.report.terminal import wide_console
+from mpgrasp.bench.report.terminal_tables import wide_console
 from mpgrasp.bench.results.cell_path import read_cells
 from mpgrasp.bench.results.reader import read_run
 from mpgrasp.bench.results.run_card import Card, Configuration, SuitePart

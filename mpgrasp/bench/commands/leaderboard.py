@@ -62,7 +62,7 @@ def main(command: Sequence[str]) -> int:
         MpgraspError: a run that cannot be read, or a file that cannot be written.
     """
     from mpgrasp.bench.report.evaluation import Evaluation
-    from mpgrasp.bench.report.terminal import print_report_table
+    from mpgrasp.bench.report.terminal_tables import print_report_table
     from mpgrasp.bench.results.runs import find_runs
 
     arguments = make_parser().parse_args(command)

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from mpgrasp.bench.meshes.check import MeshVerdict, examine, is_cached
 from mpgrasp.bench.meshes.files import ObjectFile, find_objects, label
-from mpgrasp.bench.report.terminal import wide_console
+from mpgrasp.bench.report.terminal_tables import wide_console
 from mpgrasp.bench.results.provenance import sha256
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.names import printable

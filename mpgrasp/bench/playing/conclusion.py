@@ -11,7 +11,7 @@ from mpgrasp.bench.analysis.summary import RunSummary, paired_tests, summarise
 from mpgrasp.bench.record import Line
 from mpgrasp.bench.report.ladder import threshold_table
 from mpgrasp.bench.report.sweep import sweep_table
-from mpgrasp.bench.report.terminal import print_report_table, print_table, print_tests
+from mpgrasp.bench.report.terminal_tables import print_report_table, print_table, print_tests
 from mpgrasp.bench.results.run_card import Configuration
 from mpgrasp.bench.results.trace import prune_traces
 from mpgrasp.bench.results.writer import RunDirectory

@@ -18,7 +18,7 @@ from mpgrasp.bench.analysis.summary import ClearingCounts, summarise, time_limit
 from mpgrasp.bench.playing.plan import Plan
 from mpgrasp.bench.playing.programme import PROGRAMMES, Programme, load_suites
 from mpgrasp.bench.record import Line, Method, line_of
-from mpgrasp.bench.report.terminal import print_table
+from mpgrasp.bench.report.terminal_tables import print_table
 from mpgrasp.bench.stored_lines import by_cell
 from mpgrasp.episode.config import ClearingConfig
 from mpgrasp.exceptions import ConfigError
