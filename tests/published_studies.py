@@ -350,6 +350,33 @@ def significant(ladder: str, *detectors: str) -> int:
     )
 
 
+def ended(ladder: str, outcome: str) -> int:
+    """Return how many episodes of a ladder ended so; an error if any failed in another way."""
+    lines = (RESULTS / "ladders" / ladder / "episodes.jsonl").read_text(encoding="utf-8").splitlines()
+    ends = [row["outcome"] for row in map(json.loads, lines)]
+    assert {*ends} == {"success", outcome}
+    return ends.count(outcome)
+
+
+def again_inside(*ladders: str) -> tuple[int, int]:
+    """Return how many levels in other worlds lie in the interval of the first ones, and how many there are.
+
+    Levels that lie beyond the last rung in either are left out.
+    """
+    inside = count = 0
+    for name in ladders:
+        units = {"thickness": "mm", "cloth": "mm", "calibration": "mm", "search": "m", "noise": "px",
+                 "transfer": "mm", "size": "mm"}  # fmt: skip
+        for detector in ("heuristic", "dhrnet", "oracle"):
+            for rate in (90, 50):
+                column = f"{name}, {units[name]}, {rate} %"
+                first, again = level(detector, column), level(detector, f"again-{column}")
+                if len(first) == len(again) == 3:
+                    count += 1
+                    inside += first[1] <= again[0] <= first[2]
+    return inside, count
+
+
 def opening(ladder: str, detector: str) -> float:
     """Return the median opening of a detector's grasps on a ladder [mm]."""
     lines = (RESULTS / "ladders" / ladder / "episodes.jsonl").read_text(encoding="utf-8").splitlines()
