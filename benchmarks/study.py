@@ -24,6 +24,7 @@ from mpgrasp.exceptions import ConfigError, OutputError
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.files.json_values import json_value
 from mpgrasp.paths import WEIGHTS
+from mpgrasp.plugin_names import detectors_of
 from mpgrasp.plugins import load_detector
 from mpgrasp.statistics import holm, mcnemar, wilson_interval
 
@@ -90,14 +91,17 @@ def weights_hashes(detectors: Iterable[str]) -> dict[str, str | None]:
 
 
 def load_detectors(names: str) -> tuple[dict[str, GraspDetector], dict[str, Any]]:
-    """Detectors by comma-separated names, and what run.json tells of them: runtimes and weights.
+    """Detectors by comma-separated names, NETWORK@FILE among them, and what run.json tells of them: runtimes
+    and weights.
 
     Raises:
         MpgraspError: one of them cannot be had.
     """
-    detectors = {name: load_detector(name) for name in names.split(",")}
+    known, own = detectors_of(names)
+    detectors = {name: load_detector(name, own.get(name)) for name in known}
     runtimes = {name: getattr(detector, "runtime", None) for name, detector in detectors.items()}
-    return detectors, {"runtimes": runtimes, "weights_sha256": weights_hashes(detectors)}
+    hashes = {**weights_hashes(detectors), **{name: sha256(file) for name, file in own.items()}}
+    return detectors, {"runtimes": runtimes, "weights_sha256": hashes}
 
 
 def kept(path: Path, settings: Mapping[str, Any], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:

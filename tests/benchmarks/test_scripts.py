@@ -47,8 +47,8 @@ def test_help_touches_nothing(
 
 def test_the_scripts_that_make_published_files_are_commands() -> None:
     named = {
-        "ablation", "controller_factors", "held_out", "picture", "run_time", "same_bits", "singular_film",
-        "table", "thickness", "before", "environments", "scaling",
+        "ablation", "across", "controller_factors", "held_out", "picture", "run_time", "same_bits",
+        "singular_film", "table", "thickness", "before", "environments", "scaling",
     }  # fmt: skip
     assert named <= {path.stem for path in COMMANDS}
 

@@ -247,7 +247,7 @@ def held_out(monkeypatch: pytest.MonkeyPatch, study: ModuleType) -> Any:
     monkeypatch.setattr(view, "make_scene", lambda seed, index: (stack([(0, 0, 0.02)]), None))
     monkeypatch.setattr(view, "LiftRig", Rig)
     made = {"sure": 0.8, "shy": 0.3, "blind": 0.0}
-    monkeypatch.setattr(study, "load_detector", lambda name: Points(made[name]))
+    monkeypatch.setattr(study, "load_detector", lambda name, weights: Points(made[name]))
     return found
 
 
@@ -442,3 +442,15 @@ assert not heavy, heavy
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_study_takes_a_network_with_weights_of_its_own(study: ModuleType, tmp_path: Path) -> None:
+    from mpgrasp.detectors.networks.registry import default_weights
+
+    mine = tmp_path / "mine.safetensors"
+    mine.write_bytes(default_weights("ggcnn2").read_bytes())
+    detectors, told = study.load_detectors(f"heuristic,ggcnn2,ggcnn2@{mine}")
+    assert list(detectors) == ["heuristic", "ggcnn2", "ggcnn2@mine"]
+    hashes = told["weights_sha256"]
+    assert hashes["heuristic"] is None
+    assert hashes["ggcnn2@mine"] == hashes["ggcnn2"] is not None

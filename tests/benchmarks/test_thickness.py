@@ -160,7 +160,9 @@ def test_the_same_seed_gives_the_same_file_and_a_picture(
     thickness: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = importlib.import_module("study")
-    monkeypatch.setattr(study, "load_detector", lambda name: {"guesses": Guesses, "blind": Blind}[name]())
+    monkeypatch.setattr(
+        study, "load_detector", lambda name, weights: {"guesses": Guesses, "blind": Blind}[name]()
+    )
     command = ["--detector", "guesses,blind", "--scenes", "1", "--seed", "4", "--out", str(tmp_path / "new")]
     texts = []
     for _ in range(2):
