@@ -166,27 +166,28 @@ def points(card: LadderCard, found: Sequence[Climb], rates: Rates) -> list[dict[
 
 
 def draw(results: Mapping[str, Any]) -> Figure:
-    """Levels in closed loop over the rates of single views, a panel for each ladder."""
+    """Levels in closed loop, with intervals, over the rate of single views: a panel for each ladder."""
     names = list(dict.fromkeys(row["ladder"] for row in results["points"]))
     figure, panels = study.figure(len(names))
     for axes, name in zip(panels, names, strict=True):
         rows = [row for row in results["points"] if row["ladder"] == name]
-        for k, metric in enumerate(("rectangle", "lifted")):
-            axes.plot(
-                [100 * row[metric] for row in rows], [row["level"] for row in rows], linestyle="none",
-                **study.style(k), label=metric,
-            )  # fmt: skip
         for row in rows:
-            axes.annotate(row["detector"].rpartition("@")[2], (100 * row["lifted"], row["level"]), fontsize=7)
+            network, _, weights = row["detector"].partition("@")
+            level = [[row["level"] - row["low"]], [row["high"] - row["level"]]]
+            place = 100 * row["rectangle"], row["level"]
+            axes.errorbar(*place, yerr=level, capsize=3, **study.style(int(bool(weights))))
+            axes.annotate(weights or network, place, (5, 4), textcoords="offset points", fontsize=8)
         tau = {row["metric"]: row["tau"] for row in results["agreement"] if row["ladder"] == name}
-        title = f"{name}: tau {tau['rectangle']:.2f} (rectangle), {tau['lifted']:.2f} (lifted)"
-        axes.set(xlabel="best grasp of a single view [%]", title=title)
+        title = f"{name}: tau {tau['rectangle']:.2f}; lifted {tau['lifted']:.2f}"
+        axes.set(xlabel="right by the rectangle metric, single views [%]", title=title)
         axes.set_ylabel(f"level at 50 % in closed loop [{results['units'][name]}]")
+        rungs = results["rungs"][name]
         if results["logarithmic"][name]:
             axes.set_yscale("log")
-        if results["harder"][name] == "lower":
-            axes.invert_yaxis()
-        axes.legend(loc="upper left", fontsize=9)
+            axes.minorticks_off()
+        axes.set_yticks(rungs, [f"{rung:g}" for rung in rungs])
+        axes.set_ylim(*(rungs[:: -1 if results["harder"][name] == "lower" else 1][k] for k in (0, -1)))
+        axes.margins(x=0.2)
     return figure
 
 
@@ -234,13 +235,14 @@ def _study(command: Sequence[str]) -> None:
     )
     rates, views = offline_rates(offline)
     results: dict[str, Any] = {
-        "views": views, "agreement": [], "points": [], "units": {}, "logarithmic": {}, "harder": {}
+        "views": views, "agreement": [], "points": [], "units": {}, "rungs": {}, "logarithmic": {},
+        "harder": {},
     }  # fmt: skip
     for folders in study.track(ladders, "ladders", len(ladders)):
         card, found = ladder(folders)
         results["agreement"] += agreement(card, found, rates, options.seed)
         results["points"] += points(card, found, rates)
-        results["units"][card.name] = card.unit
+        results["units"][card.name], results["rungs"][card.name] = card.unit, card.rungs
         results["logarithmic"][card.name], results["harder"][card.name] = card.logarithmic, card.harder
     about = study.about("across", command, seed=options.seed, controller=CONTROLLER, resamples=RESAMPLES)
     study.publish(options.out, "across", about, results, results["points"], draw(results))

@@ -18,8 +18,6 @@ from scipy.stats import binomtest, wilcoxon
 
 RESULTS = Path(__file__).resolve().parent.parent / "benchmarks" / "results"
 NAMES = {"DHRNet": "dhrnet", "TF-Grasp": "tfgrasp", "GG-CNN": "ggcnn", "GG-CNN2": "ggcnn2"}
-THICKNESS = ("dhrnet", "tfgrasp", "ggcnn2")
-"""Detectors of the run `closed-thickness`."""
 REAL_CELL = "real-cell/"
 RUNGS: dict[str, tuple[str, str | None]] = {
     **{f"{mm} mm": (f"oracle/stick-{mm}mm", None) for mm in ("1", "1.5", "2", "3")},
@@ -354,35 +352,6 @@ def singular_stops(run: str, detector: str, controller: str) -> tuple[int, int]:
     """Return the stops of a reach after a singular value below 0.05, and all of them."""
     stopped = [pick for pick in attempts(run, detector, controller) if pick["reflex"]]
     return sum(pick["min_singular_value"] < 0.05 for pick in stopped), len(stopped)
-
-
-def _drifts(detector: str, controller: str) -> dict[int, float]:
-    lines = cell("closed-thickness", detector, controller)
-    return {
-        k: 1e3 * line["blind_drift_m"]
-        for k, line in lines.items()
-        if line["object"] in ("stick_2mm", "stick_3mm")
-    }
-
-
-def thin_sticks() -> int:
-    """Return the number of sticks of 2 and 3 mm that each method met."""
-    (n,) = {len(_drifts(detector, name)) for detector in THICKNESS for name in ("mppc", "mvp")}
-    return n
-
-
-def drift(detector: str, controller: str) -> float:
-    """Return the mean drift to the side before the first detection of sticks of 2 and 3 mm [mm]."""
-    return mean(_drifts(detector, controller).values())
-
-
-def largest_p_of_drifts() -> float:
-    """Return the greatest corrected p of the drifts of both controllers, over the three detectors."""
-    pairs = [(_drifts(detector, "mvp"), _drifts(detector, "mppc")) for detector in THICKNESS]
-    return holm(float(wilcoxon([one[k] - other[k] for k in one]).pvalue) for one, other in pairs)[-1]
-
-
-# the paper's orderings
 
 
 @cache

@@ -384,6 +384,20 @@ def opening(ladder: str, detector: str) -> float:
     return float(1000 * median(row["grasp"]["width"] for row in rows))
 
 
+def foretold(ladder: str, column: str) -> Any:
+    """Return a cell of the table of single views against ladders: "hit, tau", "hit, the same way" or so."""
+    metric, what = (word.strip() for word in column.split(","))
+    row = entry(study("across")["agreement"], ladder=ladder.strip("`"), metric=metric)
+    if what == "tau":
+        return row["tau"], row["low"], row["high"]
+    return (row["alike"], row["told_apart"]) if what == "the same way" else row["p"]
+
+
+def level_of(ladder: str, detector: str) -> float:
+    """Return the level at 50 % of a detector, or of other weights of a network, on a ladder."""
+    return float(entry(study("across")["points"], ladder=ladder, detector=detector)["level"])
+
+
 def coverage(rate: float) -> tuple[float, float, float]:
     """Return the share of intervals that hold the truth, with its own interval [%]."""
     held = entry(study("ladder-coverage")["rows"], rate=rate)["coverage"]

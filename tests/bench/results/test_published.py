@@ -18,6 +18,7 @@ from mpgrasp.bench.analysis.summary import paired_tests, summarise
 from mpgrasp.bench.record import Cell, played
 from mpgrasp.bench.results.reader import read_lines, read_summary
 from mpgrasp.detectors.networks.description import read_card
+from mpgrasp.plugin_names import base_name
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -81,7 +82,11 @@ def wanted_files(folder: Path) -> set[str]:
 
 @EVERY_RUN
 def test_a_published_result_is_one_of_the_shipped_weights_or_is_said_to_be_stale(path: Path) -> None:
-    told = list(digests(json.loads(path.read_text(encoding="utf-8"))))
+    everything = list(digests(json.loads(path.read_text(encoding="utf-8"))))
+    brought = {name: digest for name, digest in everything if "@" in name}
+    for name, digest in brought.items():
+        assert digest == EARLIER[base_name(name)], f"{name}: weights that nobody can get"
+    told = [(name, digest) for name, digest in everything if name not in brought]
     for name, digest in told:
         assert digest in (SHIPPED[name], EARLIER[name]), f"{path.parent.name}: other weights of {name}"
     stale = {digest == EARLIER[name] for name, digest in told}
@@ -92,6 +97,8 @@ def test_a_published_result_is_one_of_the_shipped_weights_or_is_said_to_be_stale
         assert any("**The networks were trained further since**" in section for section in sections)
     elif told:
         assert any("second stage" in section for section in own), "a section says which weights it is of"
+    if brought:
+        assert any("first stage" in section for section in own), "and so of those that it brings"
 
 
 def test_most_published_results_tell_their_weights() -> None:
