@@ -94,12 +94,6 @@ def robust_range(run: str) -> tuple[float, float]:
     return min(rates), max(rates)
 
 
-def success_range(run: str) -> tuple[float, float]:
-    """Return the lowest and the highest rate of all cells of a run [%]."""
-    rates = [100 * mean(line["success"] for line in lines.values()) for lines in cells(run).values()]
-    return min(rates), max(rates)
-
-
 def episodes_of(run: str) -> int:
     """Return the number of episodes of each cell of a run."""
     (n,) = {len(lines) for lines in cells(run).values()}
@@ -146,22 +140,6 @@ def all_failures(run: str, **wanted: str) -> int:
     return sum(failures(run, detector, controller, **wanted) for _, detector, controller in cells(run))
 
 
-def narrow_failures(run: str, detector: str, margin: float) -> tuple[int, int]:
-    """Return the failures whose grasp is narrower than the oracle's by the margin [m], and all failures."""
-    oracle, lines = cell(run, "oracle", "mppc"), failed(run, detector, "mppc")
-    narrow = [
-        line for line in lines if line["grasp"]["width"] + margin <= oracle[line["episode"]]["grasp"]["width"]
-    ]
-    return len(narrow), len(lines)
-
-
-def largest_p_of_pairs(run: str, detector: str, controller: str) -> float:
-    """Return the greatest corrected p of the paired tests of a cell with every other."""
-    summary = json.loads((RESULTS / run / "summary.json").read_text(encoding="utf-8"))
-    method = [detector, controller]
-    return max(float(test["p_holm"]) for test in summary["paired_tests"] if method in (test["a"], test["b"]))
-
-
 def share_of_inference(run: str, detector: str, controller: str, suite: str | None = None) -> float:
     """Return the share of a control tick that the detector takes [%], of the mean times over all episodes."""
     times = [line["timing"] for line in cell(run, detector, controller, suite).values()]
@@ -199,11 +177,6 @@ def least_singular_value(run: str, detector: str, controller: str) -> float:
 def blind_drift(run: str, detector: str, controller: str) -> float:
     """Return the mean drift to the side before the first detection [mm]."""
     return float(1e3 * mean(line["blind_drift_m"] for line in cell(run, detector, controller).values()))
-
-
-def drift_in(run: str, detector: str, controller: str, episode: int) -> float:
-    """Return the drift to the side before the first detection in one episode [mm]."""
-    return float(1e3 * cell(run, detector, controller)[episode]["blind_drift_m"])
 
 
 def sticks_of_2mm(detector: str, controller: str, column: str) -> Any:
