@@ -398,6 +398,11 @@ def level_of(ladder: str, detector: str) -> float:
     return float(entry(study("across")["points"], ladder=ladder, detector=detector)["level"])
 
 
+def rate_of_views(detector: str) -> float:
+    """Return the share of single views in which a detector is right by the rectangle metric [%]."""
+    return 100 * float(entry(study("across")["points"], ladder="thickness", detector=detector)["rectangle"])
+
+
 def coverage(rate: float) -> tuple[float, float, float]:
     """Return the share of intervals that hold the truth, with its own interval [%]."""
     held = entry(study("ladder-coverage")["rows"], rate=rate)["coverage"]
