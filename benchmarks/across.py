@@ -171,12 +171,14 @@ def draw(results: Mapping[str, Any]) -> Figure:
     figure, panels = study.figure(len(names))
     for axes, name in zip(panels, names, strict=True):
         rows = [row for row in results["points"] if row["ladder"] == name]
-        for row in rows:
+        for k, row in enumerate(sorted(rows, key=lambda row: float(row["rectangle"]))):
             network, _, weights = row["detector"].partition("@")
             level = [[row["level"] - row["low"]], [row["high"] - row["level"]]]
             place = 100 * row["rectangle"], row["level"]
             axes.errorbar(*place, yerr=level, capsize=3, **study.style(int(bool(weights))))
-            axes.annotate(weights or network, place, (5, 4), textcoords="offset points", fontsize=8)
+            axes.annotate(
+                weights or network, place, (5, 5 - 12 * (k % 2)), textcoords="offset points", fontsize=8
+            )
         tau = {row["metric"]: row["tau"] for row in results["agreement"] if row["ladder"] == name}
         title = f"{name}: tau {tau['rectangle']:.2f}; lifted {tau['lifted']:.2f}"
         axes.set(xlabel="right by the rectangle metric, single views [%]", title=title)
@@ -186,7 +188,8 @@ def draw(results: Mapping[str, Any]) -> Figure:
             axes.set_yscale("log")
             axes.minorticks_off()
         axes.set_yticks(rungs, [f"{rung:g}" for rung in rungs])
-        axes.set_ylim(*(rungs[:: -1 if results["harder"][name] == "lower" else 1][k] for k in (0, -1)))
+        shown = [r for r in rungs if any(row["low"] / 1.5 <= r <= 1.5 * row["high"] for row in rows)]
+        axes.set_ylim(*(shown[:: -1 if results["harder"][name] == "lower" else 1][k] for k in (0, -1)))
         axes.margins(x=0.2)
     return figure
 

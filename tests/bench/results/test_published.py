@@ -77,7 +77,8 @@ def wanted_files(folder: Path) -> set[str]:
         return {"report.md"}
     if (ROOT / folder / "episodes.jsonl").exists():
         return EPISODES
-    return {"run.json", *(f"{folder.name}.{kind}" for kind in ("json", "csv", "png"))}
+    name = folder.name.removesuffix("-stage1")  # the same study of earlier weights
+    return {"run.json", *(f"{name}.{kind}" for kind in ("json", "csv", "png"))}
 
 
 @EVERY_RUN
