@@ -150,7 +150,7 @@ FACTOR_MEASURES = {
 
 def factor_effect(factor: str, column: str, thickness: float = 0.0) -> tuple[float, float, float]:
     """Return an effect of the study of factors with its interval, of all sticks or of one thickness."""
-    rows = study("controller-factors")["effects"]
+    rows = study("stage2/controller-factors")["effects"]
     wanted = {"name": factor.split("`")[1], "measure": FACTOR_MEASURES[column], "thickness_mm": thickness}
     found = entry(rows, **wanted)
     return found["effect"], found["low"], found["high"]
@@ -158,7 +158,7 @@ def factor_effect(factor: str, column: str, thickness: float = 0.0) -> tuple[flo
 
 def p_of_factor(name: str, measure: str) -> float:
     """Return the corrected p of a factor's effect over all sticks."""
-    rows = study("controller-factors")["effects"]
+    rows = study("stage2/controller-factors")["effects"]
     return float(entry(rows, name=name, measure=measure, thickness_mm=0.0)["p_holm"])
 
 
@@ -179,7 +179,7 @@ def factor_rate(thickness: float, **levels: int) -> tuple[int, int]:
 
 @cache
 def _factor_episodes() -> list[dict[str, str]]:
-    with (RESULTS / "controller-factors" / "episodes.csv").open(encoding="utf-8", newline="") as file:
+    with (RESULTS / "stage2/controller-factors" / "episodes.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 

@@ -132,7 +132,7 @@ def test_a_published_folder_holds_its_files_and_no_others() -> None:
         found.setdefault(path.parent, set()).add(path.name)
     assert found
     episodes = {
-        Path("benchmarks/results/controller-factors"): {"episodes.csv"}
+        Path("benchmarks/results/stage2/controller-factors"): {"episodes.csv"}
     }  # a study that goes on from them
     assert found == {folder: wanted_files(folder) | episodes.get(folder, set()) for folder in found}
 
