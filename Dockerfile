@@ -1,7 +1,7 @@
 # mpgrasp with headless OpenGL and the pinned versions.
 #
 #   docker build -t mpgrasp .
-#   docker run --rm -v "$PWD:/work" mpgrasp bench thin --detector dhrnet --episodes 20 --out run
+#   docker run --rm -v "$PWD:/data" mpgrasp bench thin --detector dhrnet --episodes 20 --out run
 #
 # For training, recordings, meshes or policies: --build-arg EXTRAS=torch,rerun,objects,sb3
 FROM python:3.11-slim
@@ -15,7 +15,7 @@ COPY . /src
 RUN pip install --no-cache-dir "/src[${EXTRAS}]" -c /src/constraints.txt
 
 # Results, and networks as they were compiled for this processor, stay with whoever runs it.
-WORKDIR /work
-ENV MPGRASP_CACHE=/work/.mpgrasp-cache
+WORKDIR /data
+ENV MPGRASP_CACHE=/data/.mpgrasp-cache
 ENTRYPOINT ["mpgrasp"]
 CMD ["bench", "--help"]

@@ -55,17 +55,18 @@ def offline_rates(folders: Sequence[Path]) -> tuple[Rates, int]:
         ConfigError: a folder without them, or folders of other views.
     """
     rates: Rates = {}
-    views = set()
+    views, data = set(), []
     for folder in folders:
         try:
             found = json.loads((folder / "held-out.json").read_text("utf-8"))
-        except (OSError, ValueError) as error:
-            raise ConfigError(f"no rates of single views: {error}", got=str(folder)) from error
-        for row in found["accuracy"]:
-            if row["group"] == "all":
-                views.add(row["n"])
-                rates[row["detector"]] = {metric: row[metric] for metric in METRICS}
-    if len(views) != 1:
+            data.append(json.loads((folder / "run.json").read_text("utf-8"))["data"])
+            for row in found["accuracy"]:
+                if row["group"] == "all":
+                    views.add(row["n"])
+                    rates[row["detector"]] = {metric: row[metric] for metric in METRICS}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ConfigError(f"no rates of single views: {error!r}", got=str(folder)) from error
+    if len(views) != 1 or data != data[:1] * len(data):
         raise ConfigError("folders of other views", got=sorted(views), allowed="the same ones in all")
     return rates, views.pop()
 

@@ -6,8 +6,18 @@ import importlib.util
 
 from mpgrasp.exceptions import ConfigError
 
-EXTRAS = {"torch": "torch", "rerun": "rerun", "trimesh": "objects", "coacd": "objects", "h5py": "export",
-          "pyarrow": "export", "ray": "ray", "stable_baselines3": "sb3", "moviepy": "video"}  # fmt: skip
+EXTRAS = {
+    "torch": "torch",
+    "rerun": "rerun",
+    "trimesh": "objects",
+    "coacd": "objects",
+    "fast_simplification": "objects",
+    "h5py": "export",
+    "pyarrow": "export",
+    "ray": "ray",
+    "stable_baselines3": "sb3",
+    "moviepy": "video",
+}
 """Name of the extra by the name that a library is imported by."""
 
 

@@ -23,6 +23,7 @@ from mpgrasp.controllers.config import MPPC
 from mpgrasp.controllers.controller import Command, Observation
 from mpgrasp.controllers.mppc import Mppc
 from mpgrasp.exceptions import ConfigError
+from mpgrasp.extras import check_installed
 from mpgrasp.geometry import FloatArray
 from mpgrasp.grasp import Grasp
 from mpgrasp.plugin_names import SB3
@@ -89,12 +90,9 @@ def policy_factory(name: str) -> Callable[..., Sb3Policy]:
 
 
 def _load(path: Path) -> Any:
-    try:
-        import stable_baselines3
-    except ImportError as error:
-        raise ConfigError(
-            f"a policy of stable-baselines3 takes it ({error})", allowed="pip install 'mpgrasp[sb3]'"
-        ) from error
+    check_installed("stable_baselines3", f"{SB3}{path}")
+    import stable_baselines3
+
     algorithm = _algorithm(path)
     try:
         model = getattr(stable_baselines3, algorithm).load(path, device="cpu")

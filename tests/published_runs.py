@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from statistics import mean
+from statistics import mean, median
 from typing import Any
 
 from scipy.stats import binomtest, wilcoxon
@@ -134,6 +134,12 @@ def failures(run: str, detector: str, controller: str, **wanted: str) -> int:
     """Return the number of failures of a cell, by `suite`, `outcome` or `object` where given."""
     lines = failed(run, detector, controller, wanted.get("suite"))
     return sum(all(line[key] == value for key, value in wanted.items()) for line in lines)
+
+
+def claimed_when_lifted(run: str, detector: str, controller: str) -> float:
+    """Return the median quality of the grasps of a cell that lifted."""
+    lifted = [line for line in cell(run, detector, controller).values() if line["success"]]
+    return median(float(line["grasp"]["quality"]) for line in lifted)
 
 
 def all_failures(run: str, **wanted: str) -> int:

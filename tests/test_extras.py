@@ -18,9 +18,10 @@ from mpgrasp.training.__main__ import main as training
 def test_every_extra_is_declared_and_brings_its_library() -> None:
     project = Path(mpgrasp.__file__).parents[1] / "pyproject.toml"
     declared = tomllib.loads(project.read_text())["project"]["optional-dependencies"]
-    packages = {"rerun": "rerun-sdk", "stable_baselines3": "stable-baselines3"}
+    packages = {"rerun": "rerun-sdk"}
     for library, extra in EXTRAS.items():
-        assert any(need.startswith(packages.get(library, library)) for need in declared[extra]), library
+        package = packages.get(library, library.replace("_", "-"))
+        assert any(need.startswith(package) for need in declared[extra]), library
 
 
 def test_a_library_that_is_not_there_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

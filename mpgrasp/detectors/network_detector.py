@@ -26,8 +26,8 @@ from mpgrasp.detectors.runtimes.compiled import (
     CompiledNetwork,
     fingerprint,
     of_weights,
+    read_in_torch,
     remember,
-    weights_in_torch,
     without_torch,
 )
 from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_name
@@ -108,16 +108,15 @@ class NetworkDetector:
                 detector = cls(compiled, config, compiled.runtime)
                 detector._seconds = time.perf_counter() - clock
                 return detector
-        load_weights = weights_in_torch(name)
         mark = fingerprint(file)
-        read = load_weights(name, file)
+        read = read_in_torch(name, file)
         return cls(read, config, runtime, mark if mark == fingerprint(file) else None)
 
     @property
     def weights(self) -> NetworkWeights:
         """The network in torch, read anew where a compiled one is used."""
         if isinstance(self._network, CompiledNetwork):
-            return weights_in_torch(self.name)(self.name, self._network.weights)
+            return read_in_torch(self.name, self._network.weights)
         return self._network
 
     @property

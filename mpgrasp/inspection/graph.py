@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from mpgrasp.detectors.networks.registry import check_network, default_weights
-from mpgrasp.detectors.runtimes.compiled import weights_in_torch
+from mpgrasp.detectors.runtimes.compiled import read_in_torch
 from mpgrasp.detectors.runtimes.graph import SUFFIX, Graph, write_graph
 from mpgrasp.detectors.runtimes.openvino import openvino, openvino_precision
 from mpgrasp.exceptions import ConfigError
@@ -32,7 +32,7 @@ def graph_of(name: str, weights: Path) -> Graph:
     check_network(name)
     if openvino_precision() is None:
         raise ConfigError("a graph is made by OpenVINO", allowed="pip install openvino")
-    read = weights_in_torch(name)(name, weights)
+    read = read_in_torch(name, weights)
     from mpgrasp.detectors.runtimes.graph_making import make_graph
 
     return make_graph(read, openvino())

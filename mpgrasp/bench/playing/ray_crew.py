@@ -8,7 +8,6 @@ What is written beside the lines (recordings, traces) goes to the run's folder, 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
 import re
 import socket
@@ -25,6 +24,7 @@ from mpgrasp.bench.playing.round import Round
 from mpgrasp.bench.playing.workers import FAILED_STARTS, time_limit
 from mpgrasp.bench.record import Line, Task
 from mpgrasp.exceptions import ConfigError, MpgraspError
+from mpgrasp.extras import check_installed
 
 PASSED_ON = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_CORETYPE", "MUJOCO_GL")
 """Environment variables that decide results, as they are here."""
@@ -154,8 +154,7 @@ def check(address: str | None) -> None:
     Raises:
         ConfigError: it is not, or nobody does.
     """
-    if importlib.util.find_spec("ray") is None:
-        raise ConfigError("Ray is not installed", got="--engine ray", allowed="pip install mpgrasp[ray]")
+    check_installed("ray", "--engine ray")
     where = _HOST_AND_PORT.fullmatch(address or "")
     if where is None:  # a Ray of its own, or a name such as auto, which Ray looks up at once
         return

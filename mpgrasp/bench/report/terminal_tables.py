@@ -21,8 +21,6 @@ PIPED_WIDTH = 160
 
 _ENDLESS = 10_000
 _CLEARING = ("picks", "knocked\noff", "left", "failed picks")
-
-
 _METHOD = ("suite", "detector", "controller")
 _MEAN_WITH, _MEAN, _MEDIAN = "mean time s\n(95 %)", "mean\ntime s", "median\ntime s"
 _STEPS = ((_MEDIAN,), (_MEAN_WITH,), ("n", "success"), (_MEAN,), ("left", "knocked\noff"), ("failures",))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -184,20 +183,20 @@ def made_ready(name: str, weights: Path) -> CompiledNetwork:
         found = without_torch(name, weights)
         if found is not None:
             return found
-    load_weights = weights_in_torch(name)
     mark = fingerprint(weights)
-    read = load_weights(name, weights)
+    read = read_in_torch(name, weights)
     made = of_weights(read, make_runtime(read), weights)
     if mark is not None and mark == fingerprint(weights):
         remember(made, mark)
     return made
 
 
-def weights_in_torch(name: str) -> Callable[[str, Path], NetworkWeights]:
-    """Return what reads weights into torch.
+def read_in_torch(name: str, weights: Path) -> NetworkWeights:
+    """Return a network with the weights of a file, in torch.
 
     Raises:
         ConfigError: there is no torch here.
+        WeightsError: the file is missing, unreadable or made for another network.
     """
     try:
         from mpgrasp.detectors.networks.weights import load_weights
@@ -205,7 +204,7 @@ def weights_in_torch(name: str) -> Callable[[str, Path], NetworkWeights]:
         if missing_library(error) is None:
             raise
         raise not_installed("torch", f"{name}, as it is asked for,") from error
-    return load_weights
+    return load_weights(name, weights)
 
 
 def of_weights(read: NetworkWeights, runtime: Runtime, file: Path) -> CompiledNetwork:

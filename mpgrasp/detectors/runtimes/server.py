@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpgrasp.detectors.runtimes.compiled import fingerprint, made_ready, of_weights, weights_in_torch
+from mpgrasp.detectors.runtimes.compiled import fingerprint, made_ready, of_weights, read_in_torch
 from mpgrasp.detectors.runtimes.runtime import has_cuda
 from mpgrasp.exceptions import ConfigError, MpgraspError
 from mpgrasp.processes import born_deaf, die_with_parent, ignore_interrupts
@@ -116,7 +116,7 @@ class _Shared:
         if has_cuda():
             from mpgrasp.detectors.runtimes.torch_runtime import TorchBatch
 
-            read = weights_in_torch(name)(name, weights)
+            read = read_in_torch(name, weights)
             self._batch: TorchBatch | None = TorchBatch(read)
             self.facts = of_weights(read, self._batch, weights)
         else:

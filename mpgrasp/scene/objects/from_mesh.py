@@ -9,7 +9,6 @@ decides the outcome, a refusal as well.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 import os
 from dataclasses import dataclass
@@ -21,7 +20,8 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from mpgrasp.exceptions import AssetError, ConfigError
+from mpgrasp.exceptions import AssetError
+from mpgrasp.extras import check_installed
 from mpgrasp.files.cache import load_result, store_result
 from mpgrasp.files.regular import read_regular
 from mpgrasp.geometry import FloatArray
@@ -124,12 +124,8 @@ class MeshBody:
 
 def require_packages() -> None:
     """Raise ConfigError unless all that reads and cuts meshes is installed."""
-    missing = [name for name in _PACKAGES if importlib.util.find_spec(name.replace("-", "_")) is None]
-    if missing:
-        raise ConfigError(
-            f"mesh files need packages that are not installed ({', '.join(missing)})",
-            allowed="pip install mpgrasp[objects]",
-        )
+    for name in _PACKAGES:
+        check_installed(name.replace("-", "_"), "a mesh file")
 
 
 def mesh_key(path: Path, scale: float = 1.0) -> str:

@@ -176,7 +176,7 @@ def test_nothing_usable_is_exit_code_2_with_every_reason(
         (["single", "--objects", "absent.stl"], "no such file or folder of objects; got 'absent.stl'"),
         (["single", "--objects", "."], "no mesh in folder"),
         (["single", "--objects", ".", "--density", "-1"], "--density: unusable number"),
-        (["single", "--objects", "ycb"], "pip install mpgrasp[ycb]"),
+        (["single", "--objects", "ycb"], "pip install 'mpgrasp[ycb]'"),
     ],
 )
 def test_bad_use_of_objects_is_one_line_and_exit_code_2(

@@ -198,5 +198,5 @@ def test_damaged_cache_is_made_anew(tmp_path: Path, cache: Path, content: str) -
 def test_missing_package_is_told_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = box(tmp_path / "box.stl")
     monkeypatch.setitem(sys.modules, "coacd", None)
-    with pytest.raises(ConfigError, match=r"coacd.*pip install mpgrasp\[objects\]"):
+    with pytest.raises(ConfigError, match=r"coacd.*pip install 'mpgrasp\[objects\]'"):
         read_body(path)
