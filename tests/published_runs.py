@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from statistics import mean, median
@@ -327,10 +327,18 @@ def paper_trials(detector: str, controller: str, column: str) -> Any:
     return grasps_where_next_to_nothing_was_seen(run, name, how, "single")
 
 
-def singular_stops(run: str, detector: str, controller: str) -> tuple[int, int]:
-    """Return the stops of a reach after a singular value below 0.05, and all of them."""
-    stopped = [pick for pick in attempts(run, detector, controller) if pick["reflex"]]
-    return sum(pick["min_singular_value"] < 0.05 for pick in stopped), len(stopped)
+def most_stops(run: str, detector: str, controller: str) -> tuple[int, int]:
+    """Return the stops of the episode with the most of them, and those of all episodes."""
+    stops = [len(line["stops"]) for line in cell(run, detector, controller).values()]
+    return max(stops), sum(stops)
+
+
+def picks_that_ended(run: str, detector: str, controller: str, outcome: str, objects: Sequence[str]) -> int:
+    """Return the number of picks of these objects with an outcome."""
+    return sum(
+        pick["outcome"] == outcome and pick["object"] in objects
+        for pick in attempts(run, detector, controller)
+    )
 
 
 @cache
