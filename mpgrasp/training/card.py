@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from mpgrasp.training.trainer_config import TrainConfig
-from mpgrasp.training.validation import SELECT_BY
+from mpgrasp.training.validation import selected_by
 
 LICENCE = "Apache-2.0"
 
@@ -60,7 +60,7 @@ class TrainingRecord:
             "parameters": self.parameters,
             "optimiser": f"AdamW, lr {config.lr:g} {config.schedule}, weight decay {config.weight_decay:g}",
             "config": {k: v for k, v in asdict(config).items() if k not in ("name", "settings", "input")},
-            "selected_by": SELECT_BY,
+            "selected_by": selected_by(self.config.name),
             "validation": {k: round(v, 4) for k, v in self.best.items()},
             "licence": LICENCE,
         }

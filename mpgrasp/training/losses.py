@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional as F
 
+from mpgrasp.detectors.networks.declaration import Target
+from mpgrasp.detectors.networks.registry import declaration
 from mpgrasp.training.dataset import Batch
-from mpgrasp.training.trainer_config import LossConfig
+from mpgrasp.training.trainer_config import LossConfig, TrainConfig
 
 PARTS = ("loss", "pos", "cos", "sin", "width")
 """The whole and its parts, as `grasp_loss` names them."""
@@ -72,6 +74,33 @@ def grasp_loss(
         + config.width_weight * parts["width"]
     )
     return {"loss": total, **parts}
+
+
+def batch_loss(
+    network: nn.Module, image: Tensor, target: Target, config: TrainConfig, step: int
+) -> dict[str, Tensor]:
+    """Return losses by part of a network for a batch, the network computed in the training's precision.
+
+    A network that declares a loss of its own has all of it as "pos", and nothing of the other parts.
+
+    Args:
+        network: in training mode.
+        image: (n, channels, H, W).
+        target: its labels.
+        config: settings of the training.
+        step: number of the step, which decides with the seed what is drawn at random.
+    """
+    own, device = declaration(config.name).loss, image.device.type
+    low = torch.autocast(device, torch.bfloat16, enabled=config.precision == "bfloat16")
+    if own is None:
+        with low:
+            heads = network(image)
+        return grasp_loss(heads, *target, config.loss)
+    seed = int(np.random.SeedSequence([config.seed, step]).generate_state(1)[0])
+    with low:
+        loss = own(network, image, target, torch.Generator(image.device).manual_seed(seed))
+    nothing = torch.zeros_like(loss)
+    return {"loss": loss, "pos": loss, "cos": nothing, "sin": nothing, "width": nothing}
 
 
 def _total(prediction: Tensor, target: Tensor, weight: Tensor, config: LossConfig) -> Tensor:

@@ -20,6 +20,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from mpgrasp.detectors.networks.declaration import Target
 from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.detectors.networks.weights import NetworkWeights, save_weights, width_unit
 from mpgrasp.exceptions import ConfigError, WeightsError
@@ -28,13 +29,13 @@ from mpgrasp.training.card import TrainingRecord
 from mpgrasp.training.checkpoint import read_checkpoint, write_checkpoint
 from mpgrasp.training.curves import write_curves
 from mpgrasp.training.dataset import GraspDataset
-from mpgrasp.training.losses import PARTS, grasp_loss
+from mpgrasp.training.losses import PARTS, batch_loss
 from mpgrasp.training.metrics import format_summary
 from mpgrasp.training.optimiser import make_optimiser, rate_at, update_average
 from mpgrasp.training.progress import ProgressLog
 from mpgrasp.training.start import start_from
 from mpgrasp.training.trainer_config import TrainConfig
-from mpgrasp.training.validation import SELECT_BY, Validator
+from mpgrasp.training.validation import Validator, selected_by
 
 MAX_GRADIENT = 5.0
 """Gradients are shortened to this norm."""
@@ -173,11 +174,9 @@ class Trainer:
         self.network.train()
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.lr * rate_at(self.progress, self.config.schedule)
-        image, quality, angle, width, valid = (t.to(self.device, non_blocking=True) for t in batch)
-        low = self.config.precision == "bfloat16"
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=low):
-            heads = self.network(image.contiguous(memory_format=torch.channels_last))
-        parts = grasp_loss(heads, quality, angle, width, valid, self.config.loss)
+        image, *labels = (t.to(self.device, non_blocking=True) for t in batch)
+        image = image.contiguous(memory_format=torch.channels_last)
+        parts = batch_loss(self.network, image, Target(*labels), self.config, self.step)
         self.optimiser.zero_grad(set_to_none=True)
         torch.autograd.backward(parts["loss"])
         nn.utils.clip_grad_norm_(self.network.parameters(), MAX_GRADIENT)
@@ -201,7 +200,8 @@ class Trainer:
         summary = self.evaluate()
         log.validated(self.step, summary, f"{100 * self.progress:.0f} %", format_summary(summary))
         # equal counts as better: of two the one that was trained longer
-        if summary.get(SELECT_BY, 0.0) >= self.best.get(SELECT_BY, 0.0):
+        by = selected_by(self.config.name)
+        if summary.get(by, 0.0) >= self.best.get(by, 0.0):
             self.best = summary
             self.save()
         *sums, steps = self._losses.tolist()

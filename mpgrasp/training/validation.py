@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from mpgrasp.detectors.network_detector import LARGEST, postprocess
+from mpgrasp.detectors.networks.registry import declaration
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.losses import grasp_loss, to_tensors
 from mpgrasp.training.metrics import match_labels, summarise
@@ -20,11 +21,17 @@ if TYPE_CHECKING:
 
 BATCH = 16
 """Images at a time."""
-SELECT_BY = "score"
-"""The weights that are kept are the best by this. A share of hits counts images one by one, and over a few
-hundred of them luck moves it by more than two good networks differ; the score grades every image by how good
-the label is that the network would grasp, wants angle and opening to agree as a hit does, and covers all
-validation images, while lifts are simulated for some."""
+
+
+def selected_by(name: str) -> str:
+    """Return the figure by which the weights of a network that are kept are the best.
+
+    A share of hits counts images one by one, and over a few hundred of them luck moves it by more than two
+    good networks differ; the score grades every image by how good the label is that the network would grasp,
+    wants angle and opening to agree as a hit does, and covers all validation images, while lifts are
+    simulated for some. Of a network that claims no opening the quality of that label counts.
+    """
+    return "score" if declaration(name).claims_openings else "label_quality"
 
 
 class Validator:

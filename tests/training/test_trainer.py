@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from toy_training import SMALL, config, trainer
+from toy_training import INPUT, SMALL, config, trainer
 
 from mpgrasp.detectors.network_detector import NetworkDetector
 from mpgrasp.detectors.networks.description import read_card
@@ -108,6 +108,30 @@ def test_a_resumed_run_is_the_same_as_an_unbroken_one(shards: Path, tmp_path: Pa
         assert torch.equal(whole.average[key], resumed.average[key]), key
     assert without_times(resumed.history) == without_times(whole.history)
     assert (tmp_path / "broken.csv").is_file()
+
+
+@pytest.mark.parametrize("name", ["lenz", "pinto"])
+def test_networks_that_judge_windows_train_and_resume_like_all_others(
+    name: str, shards: Path, tmp_path: Path
+) -> None:
+    small: dict[str, object] = {"size": INPUT.size, "stride": 16}
+    small |= {"small": 4, "large": 4} if name == "lenz" else {"patch": 32, "side": 32, "widths": [4] * 5}
+    changes = {"name": name, "settings": small, "validate_every": 1.0}
+    whole = trainer(shards, tmp_path / "whole.safetensors", **changes)
+    whole.run(ProgressLog(quiet=True))
+    broken = trainer(shards, tmp_path / "broken.safetensors", **changes)
+    broken.run(ProgressLog(quiet=True), stop_after=2)
+    resumed = trainer(shards, tmp_path / "broken.safetensors", **changes)
+    assert resumed.resume()
+    resumed.run(ProgressLog(quiet=True))
+    for key, value in whole.network.state_dict().items():
+        assert torch.equal(value, resumed.network.state_dict()[key]), key
+    first, last = whole.history[0], whole.history[-1]
+    assert first["loss"] == first["pos"] > 0
+    assert first["cos"] == first["sin"] == first["width"] == 0
+    assert last["validation_loss"] > 0
+    detector = NetworkDetector.load(name, tmp_path / "whole.safetensors", runtime="torch")
+    assert detector.grasp_arrays(whole.dataset.sample(0).depth)[0].shape == (INPUT.size, INPUT.size)
 
 
 def without_times(rows: list[dict[str, float]]) -> list[dict[str, float]]:

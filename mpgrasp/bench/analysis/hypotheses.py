@@ -17,7 +17,7 @@ from enum import StrEnum
 import numpy as np
 
 from mpgrasp.bench.analysis.pairing import pair_worlds
-from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, Baseline, Claim, Measure
+from mpgrasp.bench.analysis.paper import CLAIMS, CONTROLLERS, METHODS, QUOTED, Baseline, Claim, Measure
 from mpgrasp.bench.analysis.summary import time_limits
 from mpgrasp.bench.analysis.tally import restricted_time
 from mpgrasp.bench.record import Cell, Cells, PlayedLine
@@ -66,7 +66,7 @@ def cell_of(
     One detector stands for a method throughout a suite: the first of its names that occurs there.
     """
     there = {cell.detector for cell in cells if cell.suite == suite}
-    for detector in METHODS[method[0]]:
+    for detector in {**METHODS, **QUOTED}[method[0]]:
         if detector in there:
             cell = Cell(suite, detector, CONTROLLERS[baseline][method[1]])
             return cell if cell in cells else None

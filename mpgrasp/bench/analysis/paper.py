@@ -13,6 +13,8 @@ from enum import StrEnum
 METHODS = {"GG-CNN": ("ggcnn", "ggcnn2"), "TF-Grasp": ("tfgrasp",), "DHRNet": ("dhrnet",)}
 """The paper's detectors, and by which names they may stand in a run; the first one there counts, so that
 GG-CNN2 stands for GG-CNN in runs without it."""
+QUOTED = {"Lenz et al.": ("lenz",), "Pinto et al.": ("pinto",)}
+"""Detectors that Table III alone has, likewise."""
 
 
 class Baseline(StrEnum):
@@ -90,7 +92,7 @@ def reported(suite: str) -> dict[tuple[str, str], tuple[int, int]]:
     """Successes and trials that the paper reports of a suite, by (detector, controller); empty for others."""
     match suite:
         case "single":
-            return {(name, SINGLE_CONTROLLER): SINGLE[name] for name in METHODS}
+            return {(name, SINGLE_CONTROLLER): counts for name, counts in SINGLE.items()}
         case "unseen":
             sums = [sum(column) for column in zip(*UNSEEN.values(), strict=True)]
             return {cell: (k, UNSEEN_TRIALS * len(UNSEEN)) for cell, k in zip(CELLS, sums, strict=True)}

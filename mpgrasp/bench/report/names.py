@@ -6,7 +6,8 @@ from mpgrasp.bench.record import Method
 
 _NAMES = {
     "dhrnet": "DHRNet", "tfgrasp": "TF-Grasp", "ggcnn": "GG-CNN", "ggcnn2": "GG-CNN2",
-    "grconvnet": "GR-ConvNet", "fcn": "FCN", "fcn_residual": "FCN with residuals", "unet": "U-Net",
+    "grconvnet": "GR-ConvNet", "lenz": "Lenz et al.", "pinto": "Pinto et al.",
+    "fcn": "FCN", "fcn_residual": "FCN with residuals", "unet": "U-Net",
     "oracle": "oracle", "heuristic": "heuristic",
     "mppc": "MP-PC", "mvp": "MVP", "mppc_robust": "robust MP-PC", "mvp_robust": "robust MVP",
     "open_loop": "open loop", "straight_down": "straight down",

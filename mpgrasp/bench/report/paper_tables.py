@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from mpgrasp.bench.analysis.pairing import pair
 from mpgrasp.bench.analysis.paper import (
     CELLS,
-    SINGLE,
     SINGLE_CONTROLLER,
     STACKED,
     UNSEEN,
@@ -72,12 +71,6 @@ def success_table(evaluation: Evaluation, suite: str) -> Table:
         here = success_text(evaluation.summaries[cell]) if cell else ABSENT
         against = _against(cell, reference, evaluation)
         rows.append((_method_text(method, cell), rate_text(*paper[method]), here, against))
-    if suite == "single":
-        rows += [
-            (name, rate_text(*SINGLE[name]), "not built here", "-")
-            for name in SINGLE
-            if (name, SINGLE_CONTROLLER) not in paper
-        ]
     for cell in _other_cells(evaluation, suite, list(paper)):
         here, against = success_text(evaluation.summaries[cell]), _against(cell, reference, evaluation)
         rows.append((name_of(cell.method), "-", here, against))

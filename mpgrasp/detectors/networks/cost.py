@@ -35,8 +35,10 @@ are not counted. More input channels only enlarge the first convolution.
 - `fcn`, `fcn_residual`, `unet`: the paper gives no sizes. They have the shipped `dhrnet`'s finest resolution
   (a half), coarsest (1/32) and blocks per resolution, and nearly its parameters and GFLOP; they differ from
   each other in the residual blocks or the skip connections alone.
-- `tfgrasp` is laid out for 224x224; `ggcnn` was designed for 300x300 and takes any multiple of 12, `ggcnn2`
-  and `grconvnet` of 4, the others of 32.
+- `lenz` judges 47,040 rectangles and the best 100 of them again, `pinto` 784 patches of 72 px. "authors" of
+  `pinto` is AlexNet on as many patches, resized to 227 px; the authors looked at fewer of them, at random.
+- `tfgrasp`, `lenz` and `pinto` are laid out for 224x224; `ggcnn` was designed for 300x300 and takes any
+  multiple of 12, `ggcnn2` and `grconvnet` of 4, the others of 32.
 """
 
 

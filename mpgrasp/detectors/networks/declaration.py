@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpgrasp.depth import NETWORK_SIZE
 
 if TYPE_CHECKING:
-    from torch import Tensor, nn
+    from torch import Generator, Tensor, nn
 
 HEADS = ("pos", "cos", "sin", "width")
 """Outputs of every network in this order; `<head>_output` in checkpoints."""
@@ -17,6 +17,19 @@ MAX_CHANNELS = 4096
 """Most channels that a setting of a network may ask for; weights that ask for more are no weights."""
 MAX_REPEATS = 16
 """Most blocks or modules in a row that a setting may ask for."""
+
+
+class Target(NamedTuple):
+    """Labels of a batch of images, each (n, H, W), on the device of the network."""
+
+    quality: Tensor
+    """In [0, 1]."""
+    angle: Tensor
+    """Closing direction [rad]."""
+    width: Tensor
+    """In units of the width head."""
+    valid: Tensor
+    """Bool; nothing is to be learnt from the other pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +68,11 @@ class NetworkDeclaration:
     """Settings by name of the sizes that docs/networks.md lists; without settings, for all modalities."""
     published: PublishedWeights | None = None
     """Published state dicts, if there are any that can be read."""
+    loss: Callable[[Any, Tensor, Target, Generator], Tensor] | None = None
+    """Loss of the network for a batch of images (n, channels, H, W), for a network that is not trained by the
+    maps that it makes of whole images; what it draws at random it draws from the generator."""
+    claims_openings: bool = True
+    """False if the hand always opens fully, so that no width is to be compared with a label's."""
 
     def build(self, settings: Mapping[str, Any]) -> nn.Module:
         """Return the network with fresh weights; `settings` are keyword arguments of its config."""

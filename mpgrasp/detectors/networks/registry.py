@@ -25,6 +25,8 @@ NETWORKS: dict[str, str] = {
     "ggcnn": "mpgrasp.detectors.networks.ggcnn",
     "ggcnn2": "mpgrasp.detectors.networks.ggcnn",
     "grconvnet": "mpgrasp.detectors.networks.grconvnet",
+    "lenz": "mpgrasp.detectors.networks.lenz",
+    "pinto": "mpgrasp.detectors.networks.pinto",
     "fcn": "mpgrasp.detectors.networks.fcn",
     "fcn_residual": "mpgrasp.detectors.networks.fcn",
     "unet": "mpgrasp.detectors.networks.unet",

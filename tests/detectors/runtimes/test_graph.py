@@ -30,7 +30,7 @@ from mpgrasp.exceptions import WeightsError
 
 pytestmark = pytest.mark.skipif(openvino_precision() is None, reason="no OpenVINO for this processor")
 
-SHIPPED = ("dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
+SHIPPED = ("dhrnet", "tfgrasp", "ggcnn", "ggcnn2", "lenz", "pinto")
 TRANSFORMER = {"embed": 16, "depths": (1, 1, 1, 1), "heads": (1, 1, 1, 1)}
 
 
@@ -70,7 +70,7 @@ def image(weights: NetworkWeights) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 @pytest.mark.parametrize("precision", ["f32", "bf16"])
 @pytest.mark.parametrize(
-    ("name", "settings"), [("dhrnet", SMALL), ("tfgrasp", TRANSFORMER), ("ggcnn2", {}), ("unet", {})]
+    ("name", "settings"), [("dhrnet", SMALL), ("tfgrasp", TRANSFORMER), ("ggcnn2", {}), ("unet", {}), ("lenz", {}), ("pinto", {})]
 )
 def test_a_graph_gives_the_bits_of_the_network_as_torch_traces_it(
     name: str, settings: dict[str, Any], precision: str, tmp_path: Path
