@@ -116,7 +116,7 @@ class Lenz(nn.Module):
             self.register_buffer(name, torch.tensor(value, dtype=torch.float32), persistent=False)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        answers = [self._of_one(image) for image in x.split(1)]  # each takes 80 MB
+        answers = [self._of_one(image) for image in torch.split(x, 1)]  # each takes 80 MB
         pos, cos, sin, width = (torch.cat(maps) for maps in zip(*answers, strict=True))
         return pos, cos, sin, width
 

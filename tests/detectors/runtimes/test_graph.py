@@ -70,7 +70,8 @@ def image(weights: NetworkWeights) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 @pytest.mark.parametrize("precision", ["f32", "bf16"])
 @pytest.mark.parametrize(
-    ("name", "settings"), [("dhrnet", SMALL), ("tfgrasp", TRANSFORMER), ("ggcnn2", {}), ("unet", {}), ("lenz", {}), ("pinto", {})]
+    ("name", "settings"),
+    [("dhrnet", SMALL), ("tfgrasp", TRANSFORMER), ("ggcnn2", {}), ("unet", {}), ("lenz", {}), ("pinto", {})],
 )
 def test_a_graph_gives_the_bits_of_the_network_as_torch_traces_it(
     name: str, settings: dict[str, Any], precision: str, tmp_path: Path
