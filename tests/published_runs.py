@@ -25,6 +25,8 @@ RUNGS: dict[str, tuple[str, str | None]] = {
     "single": ("oracle/single", None),
 }
 """Runs of the oracle by the rung's name in docs/results.md, and the suite in them where there are several."""
+SINGLE, SINGLE_QUOTED = "single-unseen-thin", "single-quoted"
+"""Runs of `single`: of the paper's own methods, and of those that its Table III quotes."""
 TIME_LIMIT = 900.0
 """Simulated time that a table which was not cleared counts as [s]."""
 
@@ -164,6 +166,27 @@ def p_of_success(run: str, method: Method, other: Method, suite: str | None = No
     """Return p of McNemar's exact test."""
     ours, theirs = alone(run, method, other, suite), alone(run, other, method, suite)
     return float(binomtest(ours, ours + theirs, 0.5).pvalue)
+
+
+def table_iii(method: str, column: str) -> Any:
+    """Return a cell of the table of Table III's methods, with MP-PC, in the worlds that all of them met."""
+    name = {**NAMES, "Lenz et al.": "lenz", "Pinto et al.": "pinto"}[method]
+    run = SINGLE_QUOTED if name in ("lenz", "pinto") else SINGLE
+    if column == "here %":
+        return success(run, name, "mppc", "single")
+    assert column == "p against DHRNet"
+    return p_against_dhrnet(run, name)
+
+
+def p_against_dhrnet(run: str, detector: str) -> float:
+    """Return p of McNemar's exact test between a detector and DHRNet in `single`, both with MP-PC."""
+    ours, theirs = cell(run, detector, "mppc", "single"), cell(SINGLE, "dhrnet", "mppc", "single")
+    assert {k: line["scene_seed"] for k, line in ours.items()} == {
+        k: line["scene_seed"] for k, line in theirs.items()
+    }
+    better = sum(line["success"] > theirs[k]["success"] for k, line in ours.items())
+    worse = sum(line["success"] < theirs[k]["success"] for k, line in ours.items())
+    return float(binomtest(better, better + worse, 0.5).pvalue) if better + worse else 1.0
 
 
 def stopped(run: str, detector: str, controller: str) -> int:

@@ -188,12 +188,12 @@ class Lenz(nn.Module):
     def loss(self, image: Tensor, target: Target, generator: torch.Generator) -> Tensor:
         """Return the cross-entropies of both networks on drawn rectangles.
 
-        A quarter of them are the labelled grasps, a quarter lie there too and are turned and sized at random,
-        and half are random throughout. A rectangle holds as well as its pixel's label says if its direction
+        A third of them are labelled grasps, a third lie there too and are turned and sized at random, and a
+        third are random throughout. A rectangle holds as well as its pixel's label says if its direction
         is within 15 degrees and its opening `FITS`.
         """
         pixels = drawn_pixels(target.quality, target.valid, DRAWN, generator)
-        pixels = torch.cat([pixels[:, :DRAWN], pixels], dim=1)[:, : 3 * DRAWN]
+        pixels = torch.cat([pixels[:, :DRAWN], pixels], dim=1)
         labels = (target.quality, target.angle, target.width)
         quality, angle, width = (label.flatten(1).gather(1, pixels)[..., None] for label in labels)
         twice = torch.stack([torch.cos(2 * angle), torch.sin(2 * angle)])
