@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from toy_bars import SIZE, share_right_after_training
 
-from mpgrasp.detectors.networks.declaration import Target
 from mpgrasp.detectors.networks.lenz import LONG, SHORT, Lenz, LenzConfig, kinds, rectangle_offsets
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.grasp import GraspRectangle
-
-SIZE = 64
 
 
 def network(channels: int = 1) -> Lenz:
@@ -86,40 +84,11 @@ def test_only_the_best_candidates_get_a_quality() -> None:
     assert pos.min() >= 0
 
 
-def bars(count: int, generator: torch.Generator) -> tuple[torch.Tensor, Target]:
-    """Return images of a bar that stands out, upright or lying, and their labels."""
-    image = torch.zeros(count, 1, SIZE, SIZE)
-    quality, angle, width = (torch.zeros(count, SIZE, SIZE) for _ in range(3))
-    for n in range(count):
-        row, column = torch.randint(20, SIZE - 20, (2,), generator=generator).tolist()
-        lying = bool(torch.randint(2, (1,), generator=generator))
-        tall, long = (8, 18) if lying else (18, 8)
-        place = (slice(row - tall, row + tall), slice(column - long, column + long))
-        image[n, 0][place] = -0.4
-        middle = (slice(row - tall // 2, row + tall // 2), slice(column - long // 2, column + long // 2))
-        quality[n][middle] = 1
-        angle[n][middle] = -np.pi / 2 if lying else 0.0
-        width[n][middle] = 25 / (SIZE / 2)
-    return image, Target(quality, angle, width, torch.ones(count, SIZE, SIZE, dtype=torch.bool))
-
-
 def test_it_learns_where_and_in_which_direction_a_bar_is_grasped() -> None:
-    dice = torch.Generator().manual_seed(0)
     torch.manual_seed(0)
     net = Lenz(LenzConfig(size=SIZE))
-    optimiser = torch.optim.Adam(net.parameters(), 2e-3)
-    for _ in range(60):
-        optimiser.zero_grad()
-        net.loss(*bars(8, dice), dice).backward()  # type: ignore[no-untyped-call]
-        optimiser.step()
-    image, target = bars(20, dice)
-    with torch.inference_mode():
-        pos, cos, _, _ = net.eval()(image)
-    best = pos.flatten(1).argmax(dim=1, keepdim=True)
-    right = target.quality.flatten(1).gather(1, best) > 0
-    doubled = torch.cos(2 * target.angle.flatten(1).gather(1, best))
-    aligned = cos.flatten(1).gather(1, best) * doubled > 0.5
-    assert (right & aligned).float().mean() >= 0.8
+    right = share_right_after_training("lenz", net, steps=60, rate=2e-3, half=(8, 18), share=2, width_px=25)
+    assert right >= 0.8
 
 
 @pytest.mark.parametrize(

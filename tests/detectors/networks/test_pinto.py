@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from toy_bars import SIZE, share_right_after_training
 
 from mpgrasp.detectors.networks.cost import flops
-from mpgrasp.detectors.networks.declaration import Target
 from mpgrasp.detectors.networks.pinto import ANGLES, AUTHORS, Pinto, PintoConfig, bin_angles
 from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.detectors.networks.weights import width_unit
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.robot.hand import GRIPPER_MAX_WIDTH
 
-SIZE = 64
 SMALL: dict[str, Any] = {"size": SIZE, "patch": 32, "side": 32, "widths": (4,) * 5, "hidden": (8, 8)}
 
 
@@ -50,37 +49,11 @@ def test_a_patch_is_judged_by_relief_and_not_by_distance() -> None:
         assert torch.allclose(net(image)[0], net(image + 3)[0], atol=1e-5)
 
 
-def bars(count: int, generator: torch.Generator) -> tuple[torch.Tensor, Target]:
-    """Return images of an upright or a lying bar, and its labels."""
-    image = torch.zeros(count, 1, SIZE, SIZE)
-    quality, angle = torch.zeros(count, SIZE, SIZE), torch.zeros(count, SIZE, SIZE)
-    for n in range(count):
-        row, column = torch.randint(20, SIZE - 20, (2,), generator=generator).tolist()
-        lying = bool(torch.randint(2, (1,), generator=generator))
-        tall, long = (5, 18) if lying else (18, 5)
-        place = (slice(row - tall, row + tall), slice(column - long, column + long))
-        image[n, 0][place] = -0.4
-        quality[n][place] = 1
-        angle[n][place] = -np.pi / 2 if lying else 0.0
-    return image, Target(quality, angle, torch.ones_like(quality), torch.ones_like(quality, dtype=torch.bool))
-
-
 def test_it_learns_where_and_in_which_direction_a_bar_is_grasped() -> None:
-    dice = torch.Generator().manual_seed(0)
     torch.manual_seed(0)
     net = Pinto(PintoConfig(**{**SMALL, "widths": (8, 8, 8, 8, 8), "hidden": (32, 32)}))
-    optimiser = torch.optim.Adam(net.parameters(), 3e-3)
-    for _ in range(60):
-        optimiser.zero_grad()
-        net.loss(*bars(8, dice), dice).backward()  # type: ignore[no-untyped-call]
-        optimiser.step()
-    image, target = bars(20, dice)
-    with torch.inference_mode():
-        pos, cos, _, _ = net.eval()(image)
-    best = pos.flatten(1).argmax(dim=1, keepdim=True)
-    right = target.quality.flatten(1).gather(1, best) > 0
-    aligned = cos.flatten(1).gather(1, best) * torch.cos(2 * target.angle.flatten(1).gather(1, best)) > 0.5
-    assert (right & aligned).float().mean() >= 0.8
+    right = share_right_after_training("pinto", net, steps=60, rate=3e-3, half=(5, 18), share=1, width_px=25)
+    assert right >= 0.8
 
 
 def test_the_authors_network_is_alexnet() -> None:
