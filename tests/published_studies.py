@@ -55,6 +55,24 @@ def p_held_out(metric: str, group: str, other: str) -> float:
     )
 
 
+@cache
+def windows_study() -> Any:
+    """Return the study of held-out views that the networks which judge windows were shown."""
+    return json.loads((RESULTS / "held-out-windows" / "held-out.json").read_text(encoding="utf-8"))
+
+
+def views_of_windows(detector: str, what: str, group: str = "all") -> float:
+    """Return a rate of these views [%], or their number "n"."""
+    row = entry(windows_study()["accuracy"], detector=detector, group=group)
+    return float(row["n"] if what == "n" else 100 * row[what]["rate"])
+
+
+def p_of_windows(other: str) -> float:
+    """Return the corrected p of DHRNet's lifts of these views against another network's."""
+    tests = windows_study()["mcnemar"]
+    return float(entry(tests, metric="lifted", group="all", a="dhrnet", b=other)["p_holm"])
+
+
 def bin_of(detector: str, low: float) -> tuple[float, float, float, float, float]:
     """Return bounds of a bin of claimed quality, and the share that lifts."""
     found = entry(study("held-out")["calibration"][detector]["bins"], low=low)
