@@ -70,9 +70,12 @@ class PintoConfig:
                 allowed=f"five widths and two hidden layers, all 1 to {MAX_CHANNELS}",
             )
         sides = (self.patch, self.side)
-        if not 32 <= min(sides) <= max(sides) <= 512 or self.stride < 1 or self.size % self.stride:
+        fits = 32 <= min(sides) <= max(sides) <= 512 and self.patch % 2 == 0
+        if not fits or self.stride < 1 or self.size % self.stride:
             raise ConfigError(
-                "unusable patches", got=self, allowed="sides from 32 to 512, a stride that divides the image"
+                "unusable patches",
+                got=self,
+                allowed="sides from 32 to 512, that of a patch even, and a stride that divides the image",
             )
 
 

@@ -71,6 +71,7 @@ def test_the_authors_network_is_alexnet() -> None:
         {"hidden": (8,)},
         {"widths": (0,) * 5},
         {"patch": 8},
+        {"patch": 33},
         {"side": 1000},
         {"stride": 7},
     ],
