@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mpgrasp.depth import DepthFrame, inpaint
 from mpgrasp.detectors.central_square import central_square, empty_map, says_something
 from mpgrasp.detectors.config import NetworkDetectorConfig
-from mpgrasp.detectors.networks.registry import check_network, default_weights
+from mpgrasp.detectors.networks.registry import OPENING_FULLY, check_network, default_weights
 from mpgrasp.detectors.runtimes import SHARED
 from mpgrasp.detectors.runtimes.compiled import (
     CompiledNetwork,
@@ -34,6 +34,7 @@ from mpgrasp.detectors.runtimes.runtime import Runtime, make_runtime, runtime_na
 from mpgrasp.exceptions import ConfigError, WeightsError
 from mpgrasp.grasp import GraspMap
 from mpgrasp.height_map import HeightMap
+from mpgrasp.robot.hand import GRIPPER_MAX_WIDTH
 
 if TYPE_CHECKING:
     from mpgrasp.detectors.networks.weights import NetworkWeights
@@ -176,6 +177,8 @@ class NetworkDetector:
         if not seen:
             return nothing
         quality, angle, width = self.grasp_arrays(image.depth, image.rgb)
+        if self.name in OPENING_FULLY:
+            width = np.float32(GRIPPER_MAX_WIDTH * image.intrinsics.fx) / image.depth
         return replace(nothing, quality=quality, angle=angle, width=width)
 
     def grasp_arrays(

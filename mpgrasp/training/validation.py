@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from mpgrasp.detectors.network_detector import LARGEST, postprocess
-from mpgrasp.detectors.networks.registry import declaration
+from mpgrasp.detectors.networks.registry import OPENING_FULLY
 from mpgrasp.training.dataset import GraspDataset
 from mpgrasp.training.losses import grasp_loss, to_tensors
 from mpgrasp.training.metrics import match_labels, summarise
@@ -31,7 +31,7 @@ def selected_by(name: str) -> str:
     wants angle and opening to agree as a hit does, and covers all validation images, while lifts are
     simulated for some. Of a network that claims no opening the quality of that label counts.
     """
-    return "score" if declaration(name).claims_openings else "label_quality"
+    return "label_quality" if name in OPENING_FULLY else "score"
 
 
 class Validator:

@@ -19,6 +19,7 @@ from mpgrasp.detectors.networks.weights import load_weights
 from mpgrasp.exceptions import ConfigError
 from mpgrasp.geometry import line_angle_difference, looking_down, wrap_half_pi
 from mpgrasp.grasp import image_to_world_angle
+from mpgrasp.robot.hand import GRIPPER_MAX_WIDTH
 
 pytestmark = pytest.mark.usefixtures("network_cache")
 
@@ -89,3 +90,12 @@ def test_a_network_that_reads_colour_sees_it_and_says_when_there_is_none(modalit
     colours = np.random.default_rng(0).integers(0, 256, (2, 480, 640, 3), dtype=np.uint8)
     first, second = (detector.predict(replace(frame(), rgb=rgb)) for rgb in colours)
     assert not np.array_equal(first.angle, second.angle)
+
+
+def test_a_network_that_claims_no_opening_opens_the_hand_fully_wherever_the_camera_is() -> None:
+    detector = NetworkDetector.load("pinto", runtime="torch")
+    for nearer in (0.0, 0.15):
+        seen = frame()
+        found = detector.predict(replace(seen, depth=seen.depth - np.float32(nearer)))
+        opening_m = found.width * found.depth / found.intrinsics.fx
+        assert np.allclose(opening_m, GRIPPER_MAX_WIDTH, rtol=1e-5)

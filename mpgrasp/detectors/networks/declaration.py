@@ -71,8 +71,6 @@ class NetworkDeclaration:
     loss: Callable[[Any, Tensor, Target, Generator], Tensor] | None = None
     """Loss of the network for a batch of images (n, channels, H, W), for a network that is not trained by the
     maps that it makes of whole images; what it draws at random it draws from the generator."""
-    claims_openings: bool = True
-    """False if the hand always opens fully, so that no width is to be compared with a label's."""
 
     def build(self, settings: Mapping[str, Any]) -> nn.Module:
         """Return the network with fresh weights; `settings` are keyword arguments of its config."""

@@ -27,7 +27,7 @@ from mpgrasp.exceptions import ConfigError
 ANGLES = 18
 """Closing directions."""
 OPEN = 1.0
-"""Width that is claimed: more than the hand's stroke wherever the camera is, so that it opens fully."""
+"""What stands for the width, more than the stroke of the hand from anywhere; a detector claims the stroke."""
 DRAWN = 12
 """Labelled pixels, and as many of all pixels, that a step learns from in each image."""
 FIRST_KERNEL, FIRST_STRIDE = (7, 11), (2, 4)
@@ -161,6 +161,5 @@ DECLARATIONS = {
         multiple_of=8,
         variants={"shipped": {}, "authors": AUTHORS},
         loss=Pinto.loss,
-        claims_openings=False,
     ),
 }

@@ -32,6 +32,8 @@ NETWORKS: dict[str, str] = {
     "unet": "mpgrasp.detectors.networks.unet",
 }
 """Module whose `DECLARATIONS` hold the network of each name."""
+OPENING_FULLY = frozenset({"pinto"})
+"""Networks that claim no opening: a detector claims all of the hand's stroke for them."""
 
 
 def check_network(name: str) -> None:
