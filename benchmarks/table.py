@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from mpgrasp.bench.analysis.paper import QUOTED
 from mpgrasp.bench.analysis.summary import CellSummary
 from mpgrasp.bench.record import Cell
 from mpgrasp.bench.results.reader import read_summary
@@ -26,8 +27,8 @@ DOCUMENTS = {"README.md": True, "docs/results.md": False}
 """Documents with a table; True for the table of the paper's suites, False for that of all others."""
 DETECTORS = ("oracle", "dhrnet", "tfgrasp", "ggcnn", "ggcnn2")
 """Order of the rows; other detectors come after these."""
-QUOTED = ("lenz", "pinto")
-"""Detectors that were played in `single` alone; they are left out of the README's table."""
+ONLY_SINGLE = {name for names in QUOTED.values() for name in names}
+"""Detectors of Table III alone; they are left out of the README's table."""
 NOT_PLAYED = ""
 
 
@@ -96,7 +97,7 @@ def table(*, paper: bool) -> str:
 def _is_left_out(cell: Cell) -> bool:
     robust = cell.controller.endswith("_robust") and cell.detector != DETECTORS[1]
     # straight_down is the floor
-    return robust or cell.controller == "open_loop" or cell.detector in QUOTED
+    return robust or cell.controller == "open_loop" or cell.detector in ONLY_SINGLE
 
 
 def _rank(name: str, order: tuple[str, ...]) -> int:

@@ -59,6 +59,8 @@ class Validator:
     def evaluate(self, network: nn.Module) -> dict[str, float]:
         """Return metrics.summarise and "validation_loss"; the network is left in evaluation mode.
 
+        That loss is of the maps, for all networks alike, also for one that is trained by a loss of its own.
+
         Raises:
             FloatingPointError: an output of the network is not finite, or beyond `LARGEST`.
         """

@@ -45,7 +45,7 @@ _KINDS = ANGLES * len(OPENINGS)
 
 @dataclass(frozen=True, kw_only=True)
 class LenzConfig:
-    """Sizes; those of the two networks are the authors'."""
+    """Sizes; the units of the two networks are as many as the authors'."""
 
     channels: int = 1
     """Input channels: 1 depth, 3 colour, 4 both."""
@@ -239,6 +239,7 @@ DECLARATIONS = {
         config=LenzConfig,
         source="[Lenz et al.](https://arxiv.org/abs/1301.3592)",
         multiple_of=8,
+        variants={"shipped": {}},
         loss=Lenz.loss,
     ),
 }

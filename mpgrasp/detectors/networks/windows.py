@@ -29,7 +29,7 @@ class Windows(nn.Module):
     def __init__(self, size: int, stride: int, offsets: NDArray[np.intp]) -> None:
         super().__init__()
         self.size, self.stride = size, stride
-        self.kinds, self.points = offsets.shape[:2]
+        self.points = offsets.shape[1]
         self.side = size // stride
         self.reach = int(max(offsets.max() + 1, -offsets.min()))
         self._row = size + 2 * self.reach
