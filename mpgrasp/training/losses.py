@@ -81,22 +81,24 @@ def batch_loss(
 ) -> dict[str, Tensor]:
     """Return losses by part of a network for a batch, the network computed in the training's precision.
 
-    A network that declares a loss of its own has all of it as "pos", and nothing of the other parts.
+    A network that declares a loss of its own has all of it as "pos", and nothing of the other parts. What it
+    draws at random, features to drop or windows to cut, follows from the training's seed and the step.
 
     Args:
         network: in training mode.
         image: (n, channels, H, W).
         target: its labels.
         config: settings of the training.
-        step: number of the step, which decides with the seed what is drawn at random.
+        step: number of the step.
     """
     own, device = declaration(config.name).loss, image.device.type
     low = torch.autocast(device, torch.bfloat16, enabled=config.precision == "bfloat16")
+    seed = int(np.random.SeedSequence([config.seed, step]).generate_state(1)[0])
     if own is None:
-        with low:
+        with torch.random.fork_rng(), low:
+            torch.manual_seed(seed)
             heads = network(image)
         return grasp_loss(heads, *target, config.loss)
-    seed = int(np.random.SeedSequence([config.seed, step]).generate_state(1)[0])
     with low:
         loss = own(network, image, target, torch.Generator(image.device).manual_seed(seed))
     nothing = torch.zeros_like(loss)

@@ -110,6 +110,37 @@ def test_a_resumed_run_is_the_same_as_an_unbroken_one(shards: Path, tmp_path: Pa
     assert (tmp_path / "broken.csv").is_file()
 
 
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("grconvnet", {"features": 4, "dropout": 0.5}),
+        (
+            "tfgrasp",
+            {
+                "size": INPUT.size,
+                "embed": 8,
+                "depths": [1, 1],
+                "heads": [1, 2],
+                "window": 4,
+                "drop_path": 0.5,
+            },
+        ),
+    ],
+)
+def test_what_a_network_drops_at_random_is_the_same_after_a_resume(
+    name: str, settings: dict[str, object], shards: Path, tmp_path: Path
+) -> None:
+    ends = []
+    for stops in ([None], [2, None]):
+        for stop in stops:
+            run = trainer(shards, tmp_path / f"{len(stops)}.safetensors", name=name, settings=settings)
+            run.resume()
+            torch.rand(len(stops))  # what others draw does not matter
+            run.run(ProgressLog(quiet=True), stop_after=stop)
+        ends.append(run.network.state_dict())
+    assert all(torch.equal(value, ends[1][key]) for key, value in ends[0].items())
+
+
 @pytest.mark.parametrize("name", ["lenz", "pinto"])
 def test_networks_that_judge_windows_train_and_resume_like_all_others(
     name: str, shards: Path, tmp_path: Path
