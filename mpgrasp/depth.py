@@ -168,6 +168,11 @@ class DepthFrame:
             rgb=rgb,
         )
 
+    @functools.cached_property
+    def _squares(self) -> dict[tuple[int, int], NDArray[np.float32]]:
+        """Depth of what `crop_resize` was asked for, by crop and size: detector and policy look at the same."""
+        return {}
+
     def world_points(self) -> FloatArray:
         """World points (H, W, 3) [m] of all pixels; NaN where there was no return."""
         v, u = np.indices(self.depth.shape).astype(float)
@@ -197,9 +202,11 @@ def crop_resize(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE) -
     if frame.rgb is not None:
         resized = cv2.resize(frame.rgb[window], (size, size), interpolation=cv2.INTER_AREA)
         rgb = np.asarray(resized, np.uint8)
+    if (crop, size) not in frame._squares:
+        frame._squares[crop, size] = _resize_by_area(frame.depth[window], size)
     return replace(
         frame,
-        depth=_resize_by_area(frame.depth[window], size),
+        depth=frame._squares[crop, size].copy(),
         intrinsics=frame.intrinsics.centre_crop(crop).resize(size, size),
         rgb=rgb,
     )

@@ -111,9 +111,18 @@ class GraspMap:
 
     def world_points(self) -> FloatArray:
         """Return world points (H, W, 3) [m] of all pixels (eq. 3)."""
-        v, u = np.mgrid[: self.intrinsics.height, : self.intrinsics.width]
-        camera = self.intrinsics.deproject(u, v, self.depth.astype(float))
-        return transform_points(self.T_world_camera, camera)
+        return np.stack([self.world_coordinate(axis) for axis in range(3)], axis=-1)
+
+    def world_coordinate(self, axis: int) -> FloatArray:
+        """Return x (axis 0), y (1) or z (2) in the world (H, W) [m] of all pixels (eq. 3)."""
+        k, z = self.intrinsics, self.depth.astype(float)
+        along, across, deep = self.T_world_camera[axis, :3]
+        x = (np.arange(k.width) - k.cx) / k.fx * z
+        y = ((np.arange(k.height) - k.cy) / k.fy)[:, None] * z
+        result: FloatArray = x * along + z * deep
+        result += y * across
+        result += self.T_world_camera[axis, 3]
+        return result
 
     def world_width(self) -> FloatArray:
         """Return openings (H, W) [m] at each pixel's depth (eq. 3)."""

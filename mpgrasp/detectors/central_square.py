@@ -32,8 +32,8 @@ def central_square(frame: DepthFrame, crop: int = CROP, size: int = NETWORK_SIZE
 
     A depth that is no distance, such as infinity or zero, is a hole like any other, and so is a false match.
     """
-    known = np.isfinite(frame.depth) & (frame.depth > 0)
-    clean = frame if known.all() else replace(frame, depth=np.where(known, frame.depth, np.float32(np.nan)))
+    wrong = (frame.depth <= 0) | (frame.depth == np.inf)
+    clean = replace(frame, depth=np.where(wrong, np.float32(np.nan), frame.depth)) if wrong.any() else frame
     image = crop_resize(clean, min(crop, *frame.depth.shape), size)
     false = false_matches(image.depth)
     return image if false is None else replace(image, depth=np.where(false, np.float32(np.nan), image.depth))

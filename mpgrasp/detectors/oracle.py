@@ -118,14 +118,13 @@ def grasps_in_view(
         T_world_camera=image.T_world_camera,
         time=image.time,
     )
-    points = result.world_points()
-    row, col, inside = grasps.height_map.cells(points[..., 0], points[..., 1])
-    quality = np.where(inside, grasps.quality[row, col], 0)
-    if known is not None:
-        quality = np.where(known, quality, 0)
-    found = quality > 0
-    row, col = row[found], col[found]
-    result.quality[found] = quality[found]
-    result.angle[found] = world_to_image_angle(grasps.angle[row, col], image.T_world_camera)
-    result.width[found] = grasps.width[row, col] * image.intrinsics.fx / depth[found]
+    row, col, inside = grasps.height_map.cells(result.world_coordinate(0), result.world_coordinate(1))
+    cell = row * grasps.quality.shape[1] + col
+    quality = grasps.quality.take(cell)
+    quality[~inside if known is None else ~(inside & known)] = 0
+    found = np.flatnonzero(quality > 0)
+    cell = cell.take(found)
+    result.quality.flat[found] = quality.take(found)
+    result.angle.flat[found] = world_to_image_angle(grasps.angle.take(cell), image.T_world_camera)
+    result.width.flat[found] = grasps.width.take(cell) * image.intrinsics.fx / depth.take(found)
     return result

@@ -223,7 +223,7 @@ class Episode:
 
         A detector that knows the world's shape is told the true pose, and so errs by the calibration as well.
         """
-        if not reads_truth(self.detector):
+        if not reads_truth(self.detector) or self.camera.errors.calibration is None:
             return ask_detector(self.detector, frame)
         true = replace(frame, T_world_camera=self.camera.pose(self.simulation.data))
         return replace(ask_detector(self.detector, true), T_world_camera=frame.T_world_camera)
