@@ -170,7 +170,7 @@ class DepthFrame:
 
     @functools.cached_property
     def _squares(self) -> dict[tuple[int, int], NDArray[np.float32]]:
-        """Depth of what `crop_resize` was asked for, by crop and size: detector and policy look at the same."""
+        """Depth of what `crop_resize` was asked for, by crop and size: detector and policy see the same."""
         return {}
 
     def world_points(self) -> FloatArray:

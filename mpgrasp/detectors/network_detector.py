@@ -189,7 +189,7 @@ class NetworkDetector:
         All are zero where the network's output is not finite: broken weights must not choose a grasp.
         """
         heads = self._heads(self._input(depth, rgb))
-        if not bool((np.abs(heads) < LARGEST).all()):
+        if not -LARGEST < heads.min() <= heads.max() < LARGEST:  # False for NaN too
             _log.warning("%s: an output that is not finite; the frame has no grasp", self.name)
             heads = np.zeros_like(heads)
         quality, angle, width = postprocess(heads, self._width_px, self.config)

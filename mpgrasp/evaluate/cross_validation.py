@@ -92,9 +92,11 @@ def _train(
     import torch
 
     from mpgrasp.training.dataset import GraspDataset
+    from mpgrasp.training.heap import keep_memory
     from mpgrasp.training.progress import ProgressLog
     from mpgrasp.training.trainer import Trainer
 
+    keep_memory()
     if options.threads is not None:
         torch.set_num_threads(options.threads)
     config = _config(options, name)

@@ -150,10 +150,12 @@ def main(args: argparse.Namespace) -> int:
 
     from mpgrasp.files.json_values import json_value
     from mpgrasp.training.dataset import GraspDataset
+    from mpgrasp.training.heap import keep_memory
     from mpgrasp.training.progress import ProgressLog
     from mpgrasp.training.tracking import make_tracker
     from mpgrasp.training.trainer import Trainer
 
+    keep_memory()
     if args.threads is not None:
         torch.set_num_threads(args.threads)
     out: Path = args.out or Path("out", f"{config.name}.safetensors")

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, NetworkDeclaration, PublishedWeights
+from mpgrasp.detectors.networks.transposed import PhasedTranspose
 from mpgrasp.exceptions import ConfigError
 
 
@@ -56,9 +57,9 @@ class GGCNN(_GGCNN):
         self.conv1 = nn.Conv2d(config.channels, 32, 9, stride=3, padding=3)
         self.conv2 = nn.Conv2d(32, 16, 5, stride=2, padding=2)
         self.conv3 = nn.Conv2d(16, 8, 3, stride=2, padding=1)
-        self.convt1 = nn.ConvTranspose2d(8, 8, 3, stride=2, padding=1, output_padding=1)
-        self.convt2 = nn.ConvTranspose2d(8, 16, 5, stride=2, padding=2, output_padding=1)
-        self.convt3 = nn.ConvTranspose2d(16, 32, 9, stride=3, padding=3, output_padding=1)
+        self.convt1 = PhasedTranspose(8, 8, 3, stride=2, padding=1, output_padding=1)
+        self.convt2 = PhasedTranspose(8, 16, 5, stride=2, padding=2, output_padding=1)
+        self.convt3 = PhasedTranspose(16, 32, 9, stride=3, padding=3, output_padding=1)
         self._initialise()
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from mpgrasp.detectors.networks.declaration import HEADS, MAX_CHANNELS, NetworkDeclaration, PublishedWeights
+from mpgrasp.detectors.networks.transposed import PhasedTranspose
 from mpgrasp.exceptions import ConfigError
 
 
@@ -52,30 +53,6 @@ class ResidualBlock(nn.Module):
         return x + inner
 
 
-class Doubling(nn.ConvTranspose2d):
-    """Transposed 4 x 4 convolution of stride 2, computed in training as an ordinary one of four phases.
-
-    Every second row and column of the output sees its own 2 x 2 part of the kernel, so that one convolution
-    makes all four (Shi et al. 2016, https://arxiv.org/abs/1609.05158, Section 3.2). PyTorch trains that ten
-    times as fast on a CPU; the weights and, up to rounding, the output are the same.
-    """
-
-    def __init__(self, inputs: int, outputs: int, padding: int) -> None:
-        super().__init__(inputs, outputs, 4, stride=2, padding=padding, output_padding=1)
-
-    def forward(self, x: Tensor, output_size: list[int] | None = None) -> Tensor:
-        if not self.training or output_size is not None:
-            return super().forward(x, output_size)
-        phases = [self.weight[:, :, a::2, b::2].flip(2, 3) for a in (0, 1) for b in (0, 1)]
-        kernel = torch.stack(phases, 2).permute(1, 2, 0, 3, 4).flatten(0, 1)
-        bias = None if self.bias is None else self.bias.repeat_interleave(len(phases))
-        full = F.pixel_shuffle(F.conv2d(x, kernel, bias, padding=1), 2)
-        first = int(self.padding[0])
-        height, width = (2 * size + 3 - 2 * first for size in x.shape[-2:])
-        cut = full[..., first : first + height, first : first + width]
-        return cut.contiguous(memory_format=torch.channels_last)  # as the trainer has its images
-
-
 def dropped(x: Tensor, share: float) -> Tensor:
     """Return x with about that share of its values set to 0 and the others scaled up to the same mean.
 
@@ -103,9 +80,9 @@ class GRConvNet(nn.Module):
         self.conv3, self.bn3 = nn.Conv2d(two, four, 4, stride=2, padding=1), nn.BatchNorm2d(four)
         for k in range(1, 6):
             self.add_module(f"res{k}", ResidualBlock(four))
-        self.conv4 = Doubling(four, two, padding=1)
+        self.conv4 = PhasedTranspose(four, two, 4, stride=2, padding=1, output_padding=1)
         self.bn4 = nn.BatchNorm2d(two)
-        self.conv5 = Doubling(two, one, padding=2)
+        self.conv5 = PhasedTranspose(two, one, 4, stride=2, padding=2, output_padding=1)
         self.bn5 = nn.BatchNorm2d(one)
         self.conv6 = nn.ConvTranspose2d(one, one, 9, padding=4)
         for head in HEADS:  # of 2 x 2, which bring the odd size of the features back to the image's

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from mpgrasp.detectors.networks.grconvnet import Doubling, dropped
+from mpgrasp.detectors.networks.grconvnet import dropped
 from mpgrasp.detectors.networks.registry import build_network
 from mpgrasp.exceptions import ConfigError
 
@@ -46,19 +46,6 @@ def test_heads_drop_features_in_training_alone() -> None:
         assert torch.equal(network(x)[0], network(x)[0])
         network.train()
         assert not torch.equal(network(x)[0], network(x)[0])
-
-
-@pytest.mark.parametrize("padding", [1, 2])
-def test_a_doubling_computes_in_training_what_a_transposed_convolution_does(padding: int) -> None:
-    torch.manual_seed(1)
-    layer = Doubling(5, 3, padding).double()
-    x = torch.randn(2, 5, 7, 9, dtype=torch.float64, requires_grad=True)
-    trained, known = layer.train()(x), layer.eval()(x)
-    assert trained.shape == known.shape == (2, 3, 17 - 2 * padding, 21 - 2 * padding)
-    torch.testing.assert_close(trained, known)
-    goal = torch.randn_like(known)
-    slopes = [torch.autograd.grad((y * goal).sum(), (x, *layer.parameters())) for y in (trained, known)]
-    torch.testing.assert_close(*slopes)
 
 
 def test_what_is_dropped_is_that_share_and_the_mean_stays() -> None:
