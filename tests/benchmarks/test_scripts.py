@@ -49,6 +49,7 @@ def test_the_scripts_that_make_published_files_are_commands() -> None:
     named = {
         "ablation", "across", "controller_factors", "held_out", "picture", "run_time", "same_bits",
         "singular_film", "table", "thickness", "before", "environments", "scaling",
+        "generated_splits",
     }  # fmt: skip
     assert named <= {path.stem for path in COMMANDS}
 
