@@ -7,6 +7,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from mpgrasp import statistics
 from mpgrasp.exceptions import ConfigError
@@ -109,6 +110,25 @@ def test_no_paired_test_is_below_the_smallest_p_and_six_pairs_are_the_fewest() -
         assert wilcoxon(np.arange(1.0, n + 1))[0] == pytest.approx(smallest_p(n))
         assert min(mcnemar(k, m) for k in range(n + 1) for m in range(n + 1 - k)) == smallest_p(n)
     assert (smallest_p(0), smallest_p(5) > 0.05, smallest_p(6) < 0.05, FEWEST_PAIRS) == (1.0, True, True, 6)
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (3, 9), (9, 3), (50, 50), (400, 600), (401, 600), (999, 1)])
+def test_mcnemars_p_is_that_of_scipys_binomial_test(pair: tuple[int, int]) -> None:
+    assert mcnemar(*pair) == pytest.approx(scipy.stats.binomtest(pair[0], sum(pair)).pvalue, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 100, 700])
+@pytest.mark.parametrize("law", ["normal", "exponential", "laplace"])
+def test_bootstrap_intervals_are_those_of_scipy(n: int, law: str) -> None:
+    values = 5 + getattr(np.random.default_rng(n), law)(size=n)
+    for found, statistic, method in (
+        (mean_interval(values), np.mean, "BCa"),
+        (median_interval(values), np.median, "percentile"),
+    ):
+        known = scipy.stats.bootstrap(
+            (values,), statistic, method=method, rng=np.random.default_rng(0)
+        ).confidence_interval
+        assert found == pytest.approx((statistic(values), known.low, known.high), rel=1e-12)
 
 
 def test_a_bootstrap_interval_is_the_same_every_time_and_needs_two_values() -> None:
