@@ -99,6 +99,10 @@ class HeightFieldMesh:
         """
         from OpenGL import GL  # type: ignore[import-untyped]
 
+        # bare, because PyOpenGL's own keeps the pointer by a context that it does not find where something
+        # has imported PyOpenGL before MuJoCo could name its platform
+        from OpenGL.raw.GL.VERSION.GL_1_1 import glVertexPointer  # type: ignore[import-untyped]
+
         # one vertex array and one draw call, in the fixed pipeline that MuJoCo itself uses
         GL.glMatrixMode(GL.GL_PROJECTION)
         GL.glLoadMatrixf(frustum.T)
@@ -110,7 +114,7 @@ class HeightFieldMesh:
             GL.glBufferData(GL.GL_ARRAY_BUFFER, self._vertices.nbytes, self._vertices, GL.GL_STATIC_DRAW)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffer)
         GL.glEnableClientState(GL.GL_VERTEX_ARRAY)
-        GL.glVertexPointer(3, GL.GL_FLOAT, 0, ctypes.c_void_p(0))
+        glVertexPointer(3, GL.GL_FLOAT, 0, ctypes.c_void_p(0))
         GL.glDrawElements(GL.GL_TRIANGLES, triangles.size, GL.GL_UNSIGNED_INT, triangles)
         GL.glDisableClientState(GL.GL_VERTEX_ARRAY)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import mujoco
@@ -125,3 +128,25 @@ def test_a_mesh_takes_any_height_field_by_its_geom() -> None:
     corners = mesh._vertices.reshape(-1, 3)
     assert corners[:3].tolist() == [[-1, -2, 0], [0, -2, 0.5], [1, -2, 0]]
     np.testing.assert_array_equal(mesh._triangles[0, 1], [1, 2, 5, 1, 5, 4])
+
+
+OPENGL_FIRST = """
+import OpenGL.GL
+import numpy as np
+from mpgrasp.camera.config import D435_INTRINSICS
+from mpgrasp.camera.rasteriser import Rasteriser
+from mpgrasp.geometry import looking_down
+from mpgrasp.scene.config import SceneConfig
+from mpgrasp.scene.scene import build_scene
+scene = build_scene(SceneConfig(objects=("usb_stick",), cloth_unevenness=0.004), 3)
+drawer = Rasteriser(scene.model, D435_INTRINSICS.centre_crop(350))
+depth = drawer.render(scene.data(), looking_down([0.5, 0, 0.4]))
+assert np.isfinite(depth).all()
+"""
+
+
+@needs_gl
+def test_it_is_drawn_where_something_else_has_imported_pyopengl_before() -> None:
+    free = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"}
+    ran = subprocess.run([sys.executable, "-c", OPENGL_FIRST], env=free, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
