@@ -111,18 +111,21 @@ class GraspMap:
 
     def world_points(self) -> FloatArray:
         """Return world points (H, W, 3) [m] of all pixels (eq. 3)."""
-        return np.stack([self.world_coordinate(axis) for axis in range(3)], axis=-1)
+        return np.stack(self.world_coordinates(0, 1, 2), axis=-1)
 
-    def world_coordinate(self, axis: int) -> FloatArray:
-        """Return x (axis 0), y (1) or z (2) in the world (H, W) [m] of all pixels (eq. 3)."""
+    def world_coordinates(self, *axes: int) -> list[FloatArray]:
+        """Return x (axis 0), y (1) or z (2) in the world, each (H, W) [m], of all pixels (eq. 3)."""
         k, z = self.intrinsics, self.depth.astype(float)
-        along, across, deep = self.T_world_camera[axis, :3]
         x = (np.arange(k.width) - k.cx) / k.fx * z
         y = ((np.arange(k.height) - k.cy) / k.fy)[:, None] * z
-        result: FloatArray = x * along + z * deep
-        result += y * across
-        result += self.T_world_camera[axis, 3]
-        return result
+        found = []
+        for axis in axes:
+            along, across, deep = self.T_world_camera[axis, :3]
+            points: FloatArray = x * along + z * deep
+            points += y * across
+            points += self.T_world_camera[axis, 3]
+            found.append(points)
+        return found
 
     def world_width(self) -> FloatArray:
         """Return openings (H, W) [m] at each pixel's depth (eq. 3)."""

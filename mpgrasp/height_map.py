@@ -44,8 +44,10 @@ class HeightMap:
     def cells(self, x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(row, col, inside) of world positions; rows and columns are clipped, `inside` tells where."""
         finite = np.isfinite(x) & np.isfinite(y)
-        col = np.rint((np.where(finite, x, 0) - self.x0) / self.cell).astype(int)
-        row = np.rint((np.where(finite, y, 0) - self.y0) / self.cell).astype(int)
+        if not finite.all():
+            x, y = np.where(finite, x, 0), np.where(finite, y, 0)
+        col = np.rint((x - self.x0) / self.cell).astype(int)
+        row = np.rint((y - self.y0) / self.cell).astype(int)
         ny, nx = self.height.shape
-        inside = finite & (row >= 0) & (row < ny) & (col >= 0) & (col < nx)
-        return np.clip(row, 0, ny - 1), np.clip(col, 0, nx - 1), inside
+        near_row, near_col = np.minimum(np.maximum(row, 0), ny - 1), np.minimum(np.maximum(col, 0), nx - 1)
+        return near_row, near_col, finite & (near_row == row) & (near_col == col)

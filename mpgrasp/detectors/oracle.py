@@ -118,7 +118,7 @@ def grasps_in_view(
         T_world_camera=image.T_world_camera,
         time=image.time,
     )
-    row, col, inside = grasps.height_map.cells(result.world_coordinate(0), result.world_coordinate(1))
+    row, col, inside = grasps.height_map.cells(*result.world_coordinates(0, 1))
     cell = row * grasps.quality.shape[1] + col
     quality = grasps.quality.take(cell)
     quality[~inside if known is None else ~(inside & known)] = 0

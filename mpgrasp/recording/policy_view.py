@@ -59,7 +59,7 @@ def observed(frame: DepthFrame, grasp_map: GraspMap, T_world_tcp: FloatArray, ti
 def observed_depth(frame: DepthFrame) -> tuple[DepthFrame, NDArray[np.float32]]:
     """Return the central square of a frame, and its depth as it is observed."""
     image = crop_resize(frame, min(CROP, *frame.depth.shape))
-    return image, np.clip(np.nan_to_num(image.depth, nan=0.0), 0.0, FAR).astype(np.float32)
+    return image, _without_nan(np.clip(image.depth, 0.0, FAR))
 
 
 def pictured(grasp_map: GraspMap, T_world_tcp: FloatArray, time: float) -> Pictured:
@@ -107,9 +107,17 @@ def twist_of(action: ArrayLike) -> NDArray[np.float64]:
 
 def _quality_on(image: DepthFrame, view: GraspMap) -> NDArray[np.float32]:
     """Return the quality on the pixels of `image`, whatever those of the detector; 0 beyond them."""
-    to, own, quality = image.intrinsics, view.intrinsics, np.nan_to_num(view.quality)
+    to, own = image.intrinsics, view.intrinsics
+    quality = _without_nan(np.clip(view.quality, 0.0, 1.0))
     if own != to:
         v, u = np.indices((to.height, to.width)).astype(float)
         at = own.project(to.deproject(u, v, np.ones(u.shape))).astype(np.float32)  # (224, 224, 2)
         quality = np.asarray(cv2.remap(quality, at[..., 0], at[..., 1], cv2.INTER_LINEAR))
-    return np.clip(quality, 0.0, 1.0).astype(np.float32)
+    return quality
+
+
+def _without_nan(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return an image as float32 with 0 where it is NaN; it is changed, if it is float32 already."""
+    image = image.astype(np.float32, copy=False)
+    image[np.isnan(image)] = 0.0
+    return image
