@@ -117,6 +117,14 @@ def test_the_same_image_gives_the_same_bits(runtime: str, weights: NetworkWeight
 
 
 @needs_openvino
+def test_an_image_of_another_size_is_refused_and_never_stretched(weights: NetworkWeights) -> None:
+    runtime = OpenVinoRuntime(weights, "f32")
+    for wrong in (image()[0], image()[:, :1], np.concatenate([image(), image()])):
+        with pytest.raises(ValueError, match="an image of"):
+            runtime(wrong)
+
+
+@needs_openvino
 def test_heads_stay_as_they_are_when_the_next_image_comes(weights: NetworkWeights) -> None:
     runtime = make_runtime(weights, "openvino")
     heads = runtime(image())
