@@ -338,6 +338,17 @@ def p_of_levels(ladder: str, first: str, second: str, rate: float = 0.5) -> floa
     return float((found.get((first, second, rate)) or found[second, first, rate]).p_holm)
 
 
+def p_between(first: str, second: str, rate: float = 0.5) -> float:
+    """Return p of two detectors from runs of one ladder of their own, each as "RUN detector"."""
+    (card, one), (_, other) = (
+        (card, next(c for c in found if c.method.detector == who))
+        for run, who in (first.split(), second.split())
+        for card, found in (_ladder(run),)
+    )
+    (row,) = (row for row in comparisons(card.scale, [one, other]) if row.rate == rate)
+    return float(row.found.p)
+
+
 def difference(ladder: str, first: str, second: str, rate: float = 0.5) -> tuple[float, float, float]:
     """Return the level of one method over that of another, or less it on a plain scale, with its interval."""
     found = _comparisons(ladder).get((first, second, rate))

@@ -30,7 +30,7 @@ from mpgrasp.exceptions import WeightsError
 
 pytestmark = pytest.mark.skipif(openvino_precision() is None, reason="no OpenVINO for this processor")
 
-SHIPPED = ("dhrnet", "tfgrasp", "ggcnn", "ggcnn2", "lenz", "pinto")
+SHIPPED = ("dhrnet", "tfgrasp", "ggcnn", "ggcnn2", "grconvnet", "lenz", "pinto")
 TRANSFORMER = {"embed": 16, "depths": (1, 1, 1, 1), "heads": (1, 1, 1, 1)}
 
 
