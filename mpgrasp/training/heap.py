@@ -1,7 +1,7 @@
 """Memory of a training on a CPU: buffers of its layers stay with the process from step to step.
 
-glibc hands every large buffer back to the system and asks for it anew, and each new page costs a fault: two
-fifths of a training step of a wide network. Reference: mallopt(3).
+glibc hands every large buffer back to the system and asks for it anew, and each new page costs a fault, layer
+by layer. Reference: mallopt(3).
 """
 
 from __future__ import annotations

@@ -95,7 +95,8 @@ def batch_loss(
     low = torch.autocast(device, torch.bfloat16, enabled=config.precision == "bfloat16")
     seed = int(np.random.SeedSequence([config.seed, step]).generate_state(1)[0])
     if own is None:
-        with torch.random.fork_rng(), low:
+        own_devices = [] if image.device.type == "cpu" else [image.device]
+        with torch.random.fork_rng(devices=own_devices), low:
             torch.manual_seed(seed)
             heads = network(image)
         return grasp_loss(heads, *target, config.loss)

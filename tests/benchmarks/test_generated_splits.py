@@ -59,7 +59,6 @@ def test_a_study_trains_tests_publishes_and_goes_on_where_it_was(
     assert [(row["split"], row["best_n"]) for row in rows] == [("iw", "8"), ("ow", "8")]
     told = json.loads((tmp_path / "out" / "run.json").read_text())
     assert (told["limit"], told["epochs"], told["data"]) == (8, 1, "data")
-    assert str(tmp_path) not in json.dumps(told["made_with"])
 
     def never(_: object) -> int:
         raise AssertionError("trained anew")
