@@ -60,6 +60,7 @@ def test_the_same_seed_plays_the_same_episode_in_any_process_and_unrecorded(tmp_
     assert first == second
 
 
+@pytest.mark.xdist_group("shared memory")
 def test_workers_that_share_their_networks_play_what_workers_with_their_own_do(tmp_path: Path) -> None:
     options = ["--detector", "ggcnn2", "--controller", "open_loop", "--episodes", "2", "--workers", "2"]
     for runtime in ("auto", "shared"):

@@ -29,6 +29,9 @@ from mpgrasp.exceptions import ConfigError, WeightsError
 SHAPE = (1, 224, 224)
 
 
+pytestmark = pytest.mark.xdist_group("shared memory")  # which one test counts, of all processes
+
+
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MPGRASP_CACHE", str(tmp_path / "cache"))
