@@ -2,8 +2,9 @@
 
 `python -m mpgrasp.training generate --scenes 2000 --out DIR` writes shards `shard_00000.npz` of
 `SHARD_SCENES` scenes each, `meta.json` and `README.md` that describe them, and `sheet.png` to look at. A
-scene is a function of the seed, its index and the format (`shards.FORMAT`) alone, so neither the number of
-workers nor an interruption changes a byte; finished shards are kept.
+scene is a function of the seed, its index and the version of mpgrasp alone, so neither the number of workers
+nor an interruption changes a byte; finished shards are kept. `shards.FORMAT` counts the versions that drop
+other objects; between two of one format, physics may let a few scenes settle otherwise.
 """
 
 from __future__ import annotations

@@ -23,9 +23,10 @@ Made by
 
     python -m mpgrasp.training generate --scenes {scenes} --seed {seed} --views {views} --out DIR{options}
 
-{n_scenes} scenes, {n_views} views. A scene is a function of the seed, its index and the format ({format})
-alone (`mpgrasp.training.data.views.make_scene(seed, index)` builds it again). None of the objects is one of
-the evaluation sets', or comes close to the size of one.
+{n_scenes} scenes, {n_views} views. A scene is a function of the seed, its index and the version of mpgrasp
+alone: `mpgrasp.training.data.views.make_scene(seed, index)` builds it again, with the same objects in every
+version of format {format}, though physics may let a few scenes settle otherwise. None of the objects is one
+of the evaluation sets', or comes close to the size of one.
 
 ## Lifts
 

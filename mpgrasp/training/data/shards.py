@@ -20,9 +20,9 @@ from mpgrasp.training.data.verification import GOOD, LIFT_OUTCOMES, TRIAL_COLUMN
 from mpgrasp.training.data.views import META_COLUMNS
 
 FORMAT = 4
-"""Format of shards and `meta.json`, and of a seed's scenes: each is a function of seed, index and format.
+"""Format of shards and `meta.json`, and of the objects of a seed's scenes.
 
-When a seed comes to mean other scenes, count up: data on disk would be lifted in scenes that its images do
+When a seed comes to mean other objects, count up: data on disk would be lifted in scenes that its images do
 not show. An object that joins the catalogue or a shipped suite is enough, for training keeps away from it."""
 SHARD_SCENES = 20
 """Scenes in a shard."""
