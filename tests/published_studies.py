@@ -56,21 +56,22 @@ def p_held_out(metric: str, group: str, other: str) -> float:
 
 
 @cache
-def windows_study() -> Any:
-    """Return the study of held-out views that the networks which judge windows were shown."""
-    return json.loads((RESULTS / "held-out-windows" / "held-out.json").read_text(encoding="utf-8"))
+def single_views(folder: str) -> Any:
+    """Return a study of held-out views, which may lie in a folder of another name."""
+    return json.loads((RESULTS / folder / "held-out.json").read_text(encoding="utf-8"))
 
 
-def views_of_windows(detector: str, what: str, group: str = "all") -> float:
+def views_of(folder: str, detector: str, what: str, group: str = "all") -> float:
     """Return a rate of these views [%], or their number "n"."""
-    row = entry(windows_study()["accuracy"], detector=detector, group=group)
+    row = entry(single_views(folder)["accuracy"], detector=detector, group=group)
     return float(row["n"] if what == "n" else 100 * row[what]["rate"])
 
 
-def p_of_windows(other: str) -> float:
-    """Return the corrected p of DHRNet's lifts of these views against another network's."""
-    tests = windows_study()["mcnemar"]
-    return float(entry(tests, metric="lifted", group="all", a="dhrnet", b=other)["p_holm"])
+def lifts_alone(folder: str, other: str) -> tuple[float, ...]:
+    """Return the views that another network alone lifts, those of DHRNet, p, and p corrected after Holm."""
+    tests = single_views(folder)["mcnemar"]
+    row = entry(tests, metric="lifted", group="all", a="dhrnet", b=other)
+    return tuple(float(row[key]) for key in ("only_b", "only_a", "p", "p_holm"))
 
 
 def bin_of(detector: str, low: float) -> tuple[float, float, float, float, float]:
