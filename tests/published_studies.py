@@ -122,11 +122,35 @@ def fewest_right(thickness: float, height: float) -> tuple[int, int]:
     return min((int(row["right_count"]), int(row["right_n"])) for row in rows)
 
 
-def ablation(kind: str, label: str, metric: str) -> Share:
+def of_split(network: str, column: str, folder: str = "generated-splits") -> Share:
+    """Return the share of right best grasps of a network by input and split, such as "depth, image-wise"."""
+    channels, split = column.split(", ")
+    rows = json.loads((RESULTS / folder / "generated-splits.json").read_text(encoding="utf-8"))["rows"]
+    names = {**NAMES, "GR-ConvNet": "grconvnet", "Lenz et al.": "lenz"}
+    keys = (
+        {"depth": "d", "colour": "rgb", "both": "rgbd"}[channels],
+        {"image-wise": "iw", "object-wise": "ow"}[split],
+    )
+    best = entry(rows, network=names[network], channels=keys[0], split=keys[1])["best"]
+    return share(best["count"], best["n"])
+
+
+def ablation(kind: str, label: str, metric: str, seed: int = 0) -> Share:
     """Return a rate after the last epoch of a training."""
-    last = entry(study(f"ablation-{kind}")["runs"], label=label)["curve"][-1]
+    last = entry(study(f"ablation-{kind}")["runs"], label=label, seed=seed)["curve"][-1]
     assert last["epoch"] == 10
     return share(last[metric]["count"], last[metric]["n"])
+
+
+def by_seed(network: str, column: str) -> Share:
+    """Return a cell of the table of architectures, such as "rectangle, seed 0"."""
+    metric, seed = column.split(", seed ")
+    return ablation("architecture", network.strip("`"), metric, int(seed.removesuffix(" %")))
+
+
+def ablation_images(kind: str) -> int:
+    (n,) = {run["curve"][-1]["rectangle"]["n"] for run in study(f"ablation-{kind}")["runs"]}
+    return int(n)
 
 
 def ablation_range(kind: str, prefix: str, metric: str) -> tuple[float, float]:
@@ -135,8 +159,9 @@ def ablation_range(kind: str, prefix: str, metric: str) -> tuple[float, float]:
     return min(rates), max(rates)
 
 
-def p_ablation(kind: str, a: str, b: str, metric: str) -> float:
-    return float(entry(study(f"ablation-{kind}")["mcnemar"], metric=metric, a=a, b=b)["p_holm"])
+def p_ablation(kind: str, a: str, b: str, metric: str, seed: int = 0) -> float:
+    tests = study(f"ablation-{kind}")["mcnemar"]
+    return float(entry(tests, metric=metric, a=a, b=b, seed=seed)["p_holm"])
 
 
 def parameters(kind: str) -> tuple[float, float]:
