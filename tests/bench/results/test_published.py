@@ -32,7 +32,6 @@ EPISODES = {"run.json", "episodes.jsonl", "summary.json", "report.md"}
 """Files of a run of the benchmark."""
 _MODIFIED = "played from a modified checkout; to be played again with the next change of the controllers"
 STALE = {
-    "ablation-architecture": _MODIFIED,
     "ablation-fusion": _MODIFIED,
 }
 """Runs that no commit tells exactly, with the reason why they are still published."""
