@@ -78,8 +78,8 @@ def wanted_files(folder: Path) -> set[str]:
         return {"report.md"}
     if (ROOT / folder / "episodes.jsonl").exists():
         return EPISODES
-    # the same study of earlier weights, and of other networks
-    name = folder.name.removesuffix("-stage1").removesuffix("-windows")
+    # the same study of earlier weights, of other networks, and with a longer training
+    name = re.sub("-(stage1|windows|grconvnet|long)$", "", folder.name)
     return {"run.json", *(f"{name}.{kind}" for kind in ("json", "csv", "png"))}
 
 
