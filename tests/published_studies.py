@@ -122,17 +122,39 @@ def fewest_right(thickness: float, height: float) -> tuple[int, int]:
     return min((int(row["right_count"]), int(row["right_n"])) for row in rows)
 
 
+@cache
+def splits(folder: str) -> Any:
+    """Return the study of generated splits, which may lie in a folder of another name."""
+    return json.loads((RESULTS / folder / "generated-splits.json").read_text(encoding="utf-8"))
+
+
+_OF_SPLITS = {"depth": "d", "colour": "rgb", "both": "rgbd", "image-wise": "iw", "object-wise": "ow"}
+
+
 def of_split(network: str, column: str, folder: str = "generated-splits") -> Share:
-    """Return the share of right best grasps of a network by input and split, such as "depth, image-wise"."""
-    channels, split = column.split(", ")
-    rows = json.loads((RESULTS / folder / "generated-splits.json").read_text(encoding="utf-8"))["rows"]
-    names = {**NAMES, "GR-ConvNet": "grconvnet", "Lenz et al.": "lenz"}
-    keys = (
-        {"depth": "d", "colour": "rgb", "both": "rgbd"}[channels],
-        {"image-wise": "iw", "object-wise": "ow"}[split],
-    )
-    best = entry(rows, network=names[network], channels=keys[0], split=keys[1])["best"]
+    """Return the share of right best grasps by input and split, such as "depth, image-wise %"."""
+    channels, split = (_OF_SPLITS[word] for word in column.removesuffix(" %").split(", "))
+    name = {**NAMES, "GR-ConvNet": "grconvnet", "Lenz et al.": "lenz"}[network]
+    best = entry(splits(folder)["rows"], network=name, channels=channels, split=split)["best"]
     return share(best["count"], best["n"])
+
+
+def of_long_split(network: str, column: str) -> Share:
+    """Return what `of_split` does, after three times the training."""
+    return of_split(network, column, "generated-splits-long")
+
+
+def p_of_split(channels: str, split: str, b: str, folder: str = "generated-splits") -> float:
+    """Return the corrected p of DHRNet against another network, or of its inputs ("all", split, "d rgb")."""
+    a, b = b.split() if channels == "all" else ("dhrnet", b)
+    return float(entry(splits(folder)["mcnemar"], channels=channels, split=split, a=a, b=b)["p_holm"])
+
+
+def greatest_p_of_splits(*networks: str) -> float:
+    """Return the greatest corrected p of DHRNet against these networks over all inputs and splits."""
+    tests = [row for row in splits("generated-splits")["mcnemar"] if row["b"] in networks]
+    assert len(tests) == 6 * len(networks)
+    return max(float(row["p_holm"]) for row in tests)
 
 
 def ablation(kind: str, label: str, metric: str, seed: int = 0) -> Share:

@@ -30,10 +30,7 @@ EARLIER = {name: card["start"]["sha256"] for name, card in _CARDS.items() if "st
 RUNS = sorted(RESULTS.rglob("run.json"))
 EPISODES = {"run.json", "episodes.jsonl", "summary.json", "report.md"}
 """Files of a run of the benchmark."""
-_MODIFIED = "played from a modified checkout; to be played again with the next change of the controllers"
-STALE = {
-    "ablation-fusion": _MODIFIED,
-}
+STALE: dict[str, str] = {}
 """Runs that no commit tells exactly, with the reason why they are still published."""
 
 
