@@ -73,6 +73,8 @@ class Skipped:
         if not self.reasons:
             return "no image was left out"
         name, reason = next(iter(self.reasons.items()))
+        if len(self.reasons) == 1:
+            return f"1 image was left out, {name}: {reason}"
         return f"{len(self.reasons)} images were left out, the first one {name}: {reason}"
 
 

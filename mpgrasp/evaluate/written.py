@@ -62,10 +62,12 @@ def _paper(detector: str, options: Namespace) -> str:
 def summary_lines(scored: Scored, title: str) -> list[str]:
     """Return sentences about what was scored: images, units, what was left out, paired tests."""
     unit = " and ".join(sorted(scored.units)) or "-"
-    lines = [f"{title}: {scored.images} images, depth stored in {unit}; {scored.skipped}"]
+    images = "1 image" if scored.images == 1 else f"{scored.images} images"
+    lines = [f"{title}: {images}, depth stored in {unit}; {scored.skipped}"]
     without = len({row.image for row in scored.rows if not row.labelled})
     if without:
-        lines.append(f"{without} images have no label, and count for no rate but the border's")
+        unlabelled = "1 image has" if without == 1 else f"{without} images have"
+        lines.append(f"{unlabelled} no label: only the border's rate counts such images")
     lines += [
         f"{test.a} and {test.b}: alone {test.a_alone} and {test.b_alone}, Holm p {test.p_holm:.3g}"
         for test in paired_tests(scored.rows)

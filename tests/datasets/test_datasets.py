@@ -46,6 +46,10 @@ def multi_object(tmp_path: Path) -> Reader:
     return MultiObject(write_multi_object(tmp_path / "a folder"))
 
 
+def test_one_image_that_is_left_out_is_said_in_the_singular() -> None:
+    assert str(Skipped({"0101": "no depth"})) == "1 image was left out, 0101: no depth"
+
+
 @pytest.mark.parametrize("made", [cornell, jacquard, multi_object])
 def test_a_dataset_has_the_images_and_the_labels_that_were_written(
     made: Callable[[Path], Reader], tmp_path: Path

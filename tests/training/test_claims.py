@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -179,6 +180,23 @@ def test_the_documented_calibrations_are_those_that_ship() -> None:
         figures = told["card"]["calibration"]
         found = [*told["calibration"].values(), figures["ece_claimed"], figures["ece_calibrated"]]
         assert [f"{number:.2f}" for number in found] == cells.split(" | ")[:4]
+
+
+def test_the_documented_errors_on_other_scenes_are_those_of_the_published_views() -> None:
+    root = Path(__file__).parents[2]
+    documented = dict(
+        re.findall(
+            r"^\| `(\w+)` (?:\| [\d.]+ ){4}\| ([\d.]+) \|$",
+            (root / "docs" / "training.md").read_text(encoding="utf-8"),
+            re.MULTILINE,
+        )
+    )
+    published: dict[str, str] = {}
+    for folder in ("held-out-grconvnet", "held-out-windows", "held-out"):
+        study = root / "benchmarks" / "results" / folder / "held-out.json"
+        calibration = json.loads(study.read_text(encoding="utf-8"))["calibration"]
+        published |= {name: f"{found['ece']:.2f}" for name, found in calibration.items()}
+    assert documented == published
 
 
 def test_scenes_of_an_earlier_stage_of_the_training_are_refused(
